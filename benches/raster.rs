@@ -5,11 +5,11 @@
 #![allow(missing_docs)] // criterion_group! writes a public function without any
 
 use criterion::{Criterion, criterion_group, criterion_main};
-use tryon::camera::Intrinsics;
-use tryon::math::P3;
-use tryon::mesh::Face;
-use tryon::par::Par;
-use tryon::raster::{
+use tryon::geometry::camera::Intrinsics;
+use tryon::geometry::math::P3;
+use tryon::geometry::mesh::Face;
+use tryon::geometry::par::Par;
+use tryon::geometry::raster::{
     Cull, Options, View, VisibilityBuffer, rasterise, rasterise_reference, rasterise_with,
 };
 

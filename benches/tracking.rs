@@ -8,18 +8,20 @@
 use criterion::{Criterion, criterion_group, criterion_main};
 use nalgebra::{DMatrix, Vector3};
 use tryon::body::skin;
-use tryon::camera::{DepthImage, NoiseModel, RgbdFrame};
-use tryon::math::{P3, Twist, V3};
-use tryon::par::Par;
-use tryon::registration::residual::PointTerm;
-use tryon::registration::{
+use tryon::geometry::camera::{DepthImage, NoiseModel, RgbdFrame};
+use tryon::geometry::math::{P3, Twist, V3};
+use tryon::geometry::par::Par;
+use tryon::geometry::spatial::{OrganisedCloud, PointTree};
+use tryon::synth::{Actor, Routine, Sequence, Setting};
+use tryon::tracking::registration::residual::PointTerm;
+use tryon::tracking::registration::{
     Association, Dof, Metric, ModelPoints, NormalEquations, Observation, PairingConfig,
     PairingScratch, pair_surfaces,
 };
-use tryon::segment::part_forest::{PartForest, PartScratch, PersonCells};
-use tryon::segment::{Contour, PersonChoice, SegmentScratch, contour, find_person, find_planes};
-use tryon::spatial::{OrganisedCloud, PointTree};
-use tryon::synth::{Actor, Routine, Sequence, Setting};
+use tryon::tracking::segment::part_forest::{PartForest, PartScratch, PersonCells};
+use tryon::tracking::segment::{
+    Contour, PersonChoice, SegmentScratch, contour, find_person, find_planes,
+};
 use tryon::tracking::{TrackerConfig, TrackerModel, TrackerState, Workspace, step};
 
 fn subject(routine: Routine) -> Sequence {

@@ -9,17 +9,17 @@
 use std::path::PathBuf;
 use std::time::Instant;
 use tryon::body::Pose;
-use tryon::camera::ColorImage;
-use tryon::composite::{
-    BodyView, Input, Limbs, Model, RenderError, RenderReport, State, Workspace, render,
-};
 use tryon::dressing::{DressOptions, Dressed, dress};
 use tryon::formats::image::write_png_rgb;
 use tryon::garment::{Size, library};
-use tryon::gpu::Renderer;
-use tryon::math::{P3, World};
+use tryon::geometry::camera::ColorImage;
+use tryon::geometry::math::{P3, World};
 use tryon::mirror::{CameraGarments, DrawnSurface, library_appearance};
 use tryon::synth::{Actor, Sequence, Setting};
+use tryon::view::gpu::Renderer;
+use tryon::view::{
+    BodyView, Input, Limbs, Model, RenderError, RenderReport, State, Workspace, render,
+};
 
 const SIZES: [[u32; 2]; 3] = [[640, 480], [1280, 720], [1920, 1080]];
 /// Grey levels beyond which a pixel counts as different.

@@ -7,8 +7,8 @@ use std::path::{Path, PathBuf};
 use std::str::FromStr;
 use tryon::cloth::scene::{Method, RunConfig, Scene, load, run};
 use tryon::formats::npy::read_npy;
-use tryon::math::P3;
-use tryon::spatial::intersections;
+use tryon::geometry::math::P3;
+use tryon::geometry::spatial::intersections;
 
 /// Frames between two counts of self-intersections.
 const CROSSINGS_EVERY: usize = 5;

@@ -8,8 +8,8 @@ use std::hint::black_box;
 use std::path::Path;
 use std::time::Instant;
 use std::{env, fs, io};
-use tryon::contact::{ActivePair, Barrier, ContactPair, Curvature, Friction, FrictionPair};
-use tryon::math::{ElementEnergy, V3d, exp_so3};
+use tryon::cloth::contact::{ActivePair, Barrier, ContactPair, Curvature, Friction, FrictionPair};
+use tryon::geometry::math::{ElementEnergy, V3d, exp_so3};
 
 /// Pairs of a set.
 const PAIRS: usize = 2000;

@@ -11,12 +11,12 @@ use drawing::{DrawnMesh, Sheet, Turn, draw};
 use std::path::PathBuf;
 use tryon::body::Template;
 use tryon::cloth::Config;
-use tryon::contact::MapDetail;
+use tryon::cloth::contact::MapDetail;
 use tryon::dressing::Dressed;
-use tryon::evaluate::dance::{DanceReport, load};
-use tryon::evaluate::{OutfitSpec, Solid};
-use tryon::math::P3;
-use tryon::par::with_threads;
+use tryon::geometry::math::P3;
+use tryon::geometry::par::with_threads;
+use tryon_bench::dance::{DanceReport, load};
+use tryon_bench::{OutfitSpec, Solid};
 
 /// One cell of the strip, pixels.
 const CELL: (u32, u32) = (270, 460);

@@ -13,12 +13,12 @@ use tryon::clothcap::align::{
     Aligner, Alignment, FreeSurface, SurfaceFitConfig, SurfaceMatch, find_frame,
 };
 use tryon::clothcap::scan::BodyScan;
-use tryon::evaluate::garment_capture::capture_scenes;
 use tryon::formats::scan::ScanMesh;
-use tryon::linear::{Factor, SymbolicFactor, SymmetricPattern};
-use tryon::math::P3;
-use tryon::mesh::{TriMesh, face_normal};
-use tryon::par::with_threads;
+use tryon::geometry::linear::{Factor, SymbolicFactor, SymmetricPattern};
+use tryon::geometry::math::P3;
+use tryon::geometry::mesh::{TriMesh, face_normal};
+use tryon::geometry::par::with_threads;
+use tryon_bench::garment_capture::capture_scenes;
 
 /// Any error.
 type Fault = Box<dyn Error + Send + Sync>;

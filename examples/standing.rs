@@ -7,9 +7,9 @@
 #![allow(clippy::print_stdout, clippy::unwrap_used, clippy::expect_used)] // a development tool: stop at the first fault
 
 use tryon::cloth::Config;
-use tryon::evaluate::OutfitSpec;
-use tryon::evaluate::rest::{Motion, RestingSubject};
-use tryon::par::with_threads;
+use tryon::geometry::par::with_threads;
+use tryon_bench::OutfitSpec;
+use tryon_bench::rest::{Motion, RestingSubject};
 
 fn main() {
     let mut outfit = OutfitSpec {

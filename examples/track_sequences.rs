@@ -1,4 +1,4 @@
-//! Tracks recorded and synthetic scenes and prints the measures of `tryon bench tracking` for chosen settings.
+//! Tracks recorded and synthetic scenes and prints the measures of `tryon-bench tracking` for chosen settings.
 //!
 //! `cargo run --release --example track_sequences -- [--body FILE]… [--set JSON]… [--own] [--synth] [--hard] [--upper]
 //! [--frames N] [--nth N] [--still N] [--stages] FOLDER…`
@@ -10,14 +10,14 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use tryon::body::{Template, import::template_from_smpl};
-use tryon::camera::{NoiseModel, RgbdFrame};
-use tryon::evaluate::stills::stills;
-use tryon::evaluate::tracking::{TrackOutcome, follow, mean, median};
-use tryon::evaluate::{DepthScene, scenes};
 use tryon::formats::npz::read_smpl;
 use tryon::formats::read_motion;
+use tryon::geometry::camera::{NoiseModel, RgbdFrame};
 use tryon::synth::{Actor, Sequence, Setting};
 use tryon::tracking::TrackerConfig;
+use tryon_bench::stills::stills;
+use tryon_bench::tracking::{TrackOutcome, follow, mean, median};
+use tryon_bench::{DepthScene, scenes};
 
 struct Args {
     data: PathBuf,

@@ -12,21 +12,21 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Instant;
 use tryon::body::{Pose, Template, embedded};
-use tryon::camera::{Calibration, ColorImage, RgbdFrame};
 use tryon::cloth::{self, Config as ClothConfig};
-use tryon::composite::{
-    Appearance, BodyView, Config, GarmentView, Input, Limbs, Model, RenderReport, State, Workspace,
-    render,
-};
 use tryon::dressing::{DressOptions, dress, suggest};
 use tryon::formats::image::write_png_rgb;
 use tryon::formats::open_recording;
 use tryon::garment::library;
-use tryon::math::{P3, World};
-use tryon::mesh::Face;
+use tryon::geometry::camera::{Calibration, ColorImage, RgbdFrame};
+use tryon::geometry::math::{P3, World};
+use tryon::geometry::mesh::Face;
+use tryon::geometry::par::{Par, with_threads};
 use tryon::mirror::library_appearance;
-use tryon::par::{Par, with_threads};
 use tryon::tracking::{self, Status, TrackerConfig, TrackerModel, TrackerState};
+use tryon::view::{
+    Appearance, BodyView, Config, GarmentView, Input, Limbs, Model, RenderReport, State, Workspace,
+    render,
+};
 
 /// Rounds before the timed ones.
 const WARM_UP: usize = 3;

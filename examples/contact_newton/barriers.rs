@@ -1,9 +1,9 @@
 //! Barriers and Hessians that are compared.
 
-use tryon::contact::{
+use tryon::cloth::contact::{
     ActivePair, Barrier, BarrierSample, ContactPair, Curvature, ParallelMollifier,
 };
-use tryon::math::{ElementEnergy, V3d, project_psd};
+use tryon::geometry::math::{ElementEnergy, V3d, project_psd};
 
 /// Barrier as a function of the gap g = d − ξ over its activation, y.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -11,7 +11,7 @@ use barriers::{ContactEnergy, HessianKind, Profile};
 use scene::Scene;
 use solver::Simulation;
 use std::env;
-use tryon::contact::Barrier;
+use tryon::cloth::contact::Barrier;
 
 /// Time step (s).
 const STEP: f64 = 1.0 / 60.0;

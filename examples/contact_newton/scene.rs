@@ -2,8 +2,8 @@
 
 use std::collections::BTreeSet;
 use std::f64::consts::{PI, TAU};
-use tryon::contact::{ActivePair, ContactPair};
-use tryon::math::V3d;
+use tryon::cloth::contact::{ActivePair, ContactPair};
+use tryon::geometry::math::V3d;
 
 /// Vertices along a side of a sheet.
 const SIDE: usize = 12;

@@ -3,8 +3,8 @@
 use crate::barriers::ContactEnergy;
 use crate::scene::{Scene, free_share};
 use nalgebra::{Matrix3, SVector};
-use tryon::contact::{ActivePair, ContactElement};
-use tryon::math::V3d;
+use tryon::cloth::contact::{ActivePair, ContactElement};
+use tryon::geometry::math::V3d;
 
 /// Newton steps below this end a time step (m).
 const CONVERGED: f64 = 1e-5;

@@ -3,9 +3,9 @@
 
 use tryon::body::Template;
 use tryon::garment::{GarmentMesh, library};
-use tryon::math::{P3, V3};
-use tryon::mesh::{Face, face_normal};
-use tryon::raster::{View, VisibilityBuffer, interpolate, rasterise};
+use tryon::geometry::math::{P3, V3};
+use tryon::geometry::mesh::{Face, face_normal};
+use tryon::geometry::raster::{View, VisibilityBuffer, interpolate, rasterise};
 
 /// Colour of bodies, sRGB, 0 to 1.
 const SKIN: [f32; 3] = [0.86, 0.70, 0.60];
@@ -183,7 +183,7 @@ impl Sheet {
     /// Writes the sheet and prints its path.
     pub(crate) fn write(self, path: &std::path::Path) {
         let (w, h) = (self.columns * self.cell.0, self.rows * self.cell.1);
-        let image = tryon::camera::ColorImage::new(w, h, self.data).expect("a picture");
+        let image = tryon::geometry::camera::ColorImage::new(w, h, self.data).expect("a picture");
         tryon::formats::image::write_png_rgb(path, &image).expect("written");
         println!("{}", path.display());
     }

@@ -12,8 +12,8 @@ use tryon::dressing::{
     DressError, DressOptions, Dressed, FitMap, FitProbe, GarmentSource, dress_all,
 };
 use tryon::garment::{GarmentMesh, library};
-use tryon::math::{P3, World};
-use tryon::spatial::intersections;
+use tryon::geometry::math::{P3, World};
+use tryon::geometry::spatial::intersections;
 
 /// Steps a second.
 const RATE: f64 = 30.0;

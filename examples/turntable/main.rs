@@ -20,7 +20,7 @@ mod wardrobe;
 use args::Args;
 use drawing::{DrawnMesh, Sheet, Turn, draw};
 use fitting::{Fitting, height_range};
-use tryon::math::P3;
+use tryon::geometry::math::P3;
 
 /// Space around the body in a cell, and above and below a cropped garment, metres.
 const BODY_MARGIN: f32 = 0.03;

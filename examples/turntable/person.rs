@@ -2,8 +2,7 @@
 
 use std::sync::Arc;
 use tryon::body::{BodyShape, BoneTransforms, Pose, RestBody, Template, skin};
-use tryon::evaluate::rest::lower_arms;
-use tryon::math::{Body, P3, Rigid, World};
+use tryon::geometry::math::{Body, P3, Rigid, World};
 use tryon::tracking::{self, TrackerConfig, TrackerModel, TrackerState};
 
 /// Stature, girth, sex, limb length, torso length, shoulders, chest, waist, hip in standard deviations.
@@ -67,7 +66,7 @@ fn tracked(path: &std::path::Path) -> Person {
     );
     let (mut state, mut work) = (TrackerState::new(&model), tracking::Workspace::default());
     let (mut film, mut begun) = (Vec::new(), None);
-    let mut see = |frame: &tryon::camera::RgbdFrame| {
+    let mut see = |frame: &tryon::geometry::camera::RgbdFrame| {
         tracking::step(&model, &mut state, frame, &mut work).expect("a step");
         if state.status != tracking::Status::Tracking {
             return;
@@ -111,7 +110,7 @@ pub(crate) fn pose(name: &str, template: &Template, rest: &RestBody, t: f64) -> 
         _ => 1.3,
     };
     if name != "rest" {
-        lower_arms(template, rest, down, &mut p);
+        p.lower_arms(template.skeleton(), rest, down);
     }
     if name == "walk" {
         for (side, a) in [("left", swing), ("right", -swing)] {
@@ -132,7 +131,7 @@ pub(crate) fn posed(template: &Template, rest: &RestBody, pose: &Pose<World>) ->
     pose.bones(template.skeleton(), rest, &mut bones);
     let mut out = Vec::new();
     skin(
-        tryon::par::Par::Seq,
+        tryon::geometry::par::Par::Seq,
         &rest.vertices,
         template.weights(),
         &bones,

@@ -2,6 +2,13 @@
 //!
 //! The protos in `proto/tryon/v1` are the reference; `src/gen` is made from them by
 //! `cargo run -p tryon-proto-generate` and checked in.
+//!
+//! # Ideas
+//!
+//! - Arrays as checked bytes: [`mod@convert::bulk`].
+//! - Errors by field path: [`mod@convert::error`].
+//! - Names of stores, cameras, sessions: [`mod@keys`].
+#![allow(rustdoc::private_intra_doc_links)] // the index of ideas names private modules
 
 pub mod convert;
 pub mod keys;

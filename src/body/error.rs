@@ -1,6 +1,6 @@
 //! Faults of a body's data.
 
-use crate::mesh::MeshError;
+use tryon_geometry::mesh::MeshError;
 
 /// A fault of a body's data.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]

@@ -3,10 +3,10 @@
 use super::{
     BodyError, Joint, JointMotion, PoseShapes, ShapeSpace, Skeleton, SkinWeights, Template,
 };
-use crate::formats::npz::{SmplArrays, regress};
-use crate::math::{P3, V3};
-use crate::mesh::TriMesh;
 use nalgebra::{Point3, Vector3};
+use tryon_formats::npz::{SmplArrays, regress};
+use tryon_geometry::math::{P3, V3};
+use tryon_geometry::mesh::TriMesh;
 
 /// Bend of the rest pose from which on it defines the plane of elbow or knee, radians; below, the forward direction
 /// does. At 0.25 the axis is known to some 5° when joints are off by 5 mm.
@@ -251,11 +251,11 @@ fn hinge(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::body::{BodyShape, BoneTransforms, Pose};
-    use crate::formats::npz::read_smpl;
-    use crate::formats::shared_data;
-    use crate::math::{Body, Rigid};
+    use crate::{BodyShape, BoneTransforms, Pose};
     use std::path::{Path, PathBuf};
+    use tryon_formats::npz::read_smpl;
+    use tryon_formats::shared_data;
+    use tryon_geometry::math::{Body, Rigid};
 
     fn makehuman(file: &str) -> Option<PathBuf> {
         shared_data(Path::new("body/makehuman_smpl_layout").join(file))

@@ -1,9 +1,9 @@
 //! Pose (root transform and joint angles) and forward kinematics.
 
 use super::{JointMotion, RestBody, Skeleton};
-use crate::math::{Body, Camera, Rigid, exp_so3, log_so3};
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
+use tryon_geometry::math::{Body, Camera, Rigid, exp_so3, log_so3};
 
 /// Pose of a body in frame `F` (the depth camera unless said otherwise).
 #[derive(Serialize, Deserialize)]
@@ -99,6 +99,23 @@ impl<F> Pose<F> {
             self.angles[at..at + n].copy_from_slice(&values[..n]);
         }
     }
+    /// Turns the upper arms to `angle` rad below the horizontal, to the sides; a skeleton without them keeps its pose.
+    pub fn lower_arms(&mut self, skeleton: &Skeleton, rest: &RestBody, angle: f64) {
+        for (side, s) in [("left", 1.0), ("right", -1.0)] {
+            let [shoulder, elbow] =
+                ["shoulder", "elbow"].map(|n| skeleton.index(&format!("{side}_{n}")));
+            let (Some(shoulder), Some(elbow)) = (shoulder, elbow) else {
+                continue;
+            };
+            let down = Vector3::new(s * angle.cos(), -angle.sin(), 0.0);
+            let along = rest.joints[elbow] - rest.joints[shoulder];
+            let turn = UnitQuaternion::rotation_between(&along, &down);
+            let at = skeleton.dof_offset(shoulder);
+            if let (Some(turn), Some(angles)) = (turn, self.angles.get_mut(at..at + 3)) {
+                angles.copy_from_slice(log_so3(&turn).as_slice());
+            }
+        }
+    }
     /// Moves every angle into its limits.
     pub fn clamp_to_limits(&mut self, skeleton: &Skeleton) {
         for (a, l) in self.angles.iter_mut().zip(skeleton.limits()) {
@@ -139,19 +156,19 @@ impl<F> Pose<F> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::body::{BodyShape, SkinWeights, embedded, skin};
-    use crate::formats::gltf::skinned::decoded::posed_meshes;
-    use crate::formats::gltf::{
-        GlbInterpolation, GlbJoint, GlbJointMotion, GlbMesh, GlbMorphMotion, GlbMorphTarget,
-        SkinnedGlb, SkinnedMesh, encode_skinned_glb,
-    };
-    use crate::math::{P3, V3, World};
-    use crate::mesh::Face;
-    use crate::par::Par;
+    use crate::decoded_glb::posed_meshes;
+    use crate::{BodyShape, SkinWeights, embedded, skin};
     use nalgebra::distance;
     use rand::{Rng, SeedableRng};
     use rand_pcg::Pcg64Mcg;
     use std::path::Path;
+    use tryon_formats::gltf::{
+        GlbInterpolation, GlbJoint, GlbJointMotion, GlbMesh, GlbMorphMotion, GlbMorphTarget,
+        SkinnedGlb, SkinnedMesh, encode_skinned_glb,
+    };
+    use tryon_geometry::math::{P3, V3, World};
+    use tryon_geometry::mesh::Face;
+    use tryon_geometry::par::Par;
 
     /// Times of the poses.
     const SECONDS: [f64; 3] = [0.0, 0.04, 0.08];

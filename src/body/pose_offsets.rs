@@ -3,9 +3,9 @@
 use super::pose_shapes::{ENTRIES, PoseShapes};
 use super::skinning::skin_moved;
 use super::{BoneTransforms, Skeleton, Template};
-use crate::math::{P3, V3};
-use crate::par::{self, Par};
 use nalgebra::Matrix3;
+use tryon_geometry::math::{P3, V3};
+use tryon_geometry::par::{self, Par};
 
 /// Entries of R(θ) − I below which a joint is not turned: offsets of a nanometre. Larger values drop small corrections.
 const NEGLIGIBLE: f32 = 1e-6;
@@ -81,11 +81,11 @@ impl Template {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::body::{BodyShape, Pose, embedded, skin};
-    use crate::math::{Rigid, World, exp_so3};
+    use crate::{BodyShape, Pose, embedded, skin};
     use nalgebra::{Matrix4, Point3, Vector3};
     use rand::{Rng, SeedableRng};
     use rand_pcg::Pcg64Mcg;
+    use tryon_geometry::math::{Rigid, World, exp_so3};
 
     const SIZE: f32 = 0.01;
 

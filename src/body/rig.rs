@@ -3,13 +3,13 @@
 use super::{
     BodyError, BoneTransforms, Joint, JointMotion, RestBody, Skeleton, SkinWeights, Template,
 };
-use crate::math::P3;
-use crate::mesh::smoothing::mean;
-use crate::mesh::{Face, Topology, TriMesh, vertex_normals};
-use crate::par::Par;
-use crate::spatial::PointTree;
 use nalgebra::Vector3;
 use std::f64::consts::PI;
+use tryon_geometry::math::P3;
+use tryon_geometry::mesh::smoothing::mean;
+use tryon_geometry::mesh::{Face, Topology, TriMesh, vertex_normals};
+use tryon_geometry::par::Par;
+use tryon_geometry::spatial::PointTree;
 
 /// Template vertices further than this from a mesh vertex lend it no weights, metres. A template on the mesh is within
 /// 5 cm even where hair or shoes stand off.

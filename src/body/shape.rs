@@ -1,11 +1,11 @@
 //! Personal shape: coefficients, bone scales and surface displacements, applied to a template.
 
 use super::Template;
-use crate::math::{P3, V3};
-use crate::mesh::vertex_normals;
-use crate::par::Par;
 use nalgebra::{Point3, Vector3};
 use serde::{Deserialize, Serialize};
+use tryon_geometry::math::{P3, V3};
+use tryon_geometry::mesh::vertex_normals;
+use tryon_geometry::par::Par;
 
 /// Shape of a subject relative to the template. Default: the template itself.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]

@@ -1,7 +1,7 @@
 //! Linear shape space of a template.
 
-use crate::math::V3;
 use nalgebra::Vector3;
+use tryon_geometry::math::V3;
 
 /// Linear directions of body shape.
 #[derive(Clone, Debug, Default, PartialEq)]

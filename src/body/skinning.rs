@@ -1,8 +1,8 @@
 //! Linear blend skinning with at most four joints a vertex (eq. 4).
 
 use super::{BoneTransforms, Pose, RestBody, SkinWeights, Template};
-use crate::math::{P3, V3};
-use crate::par::{self, Par};
+use tryon_geometry::math::{P3, V3};
+use tryon_geometry::par::{self, Par};
 
 impl Template {
     /// Skins a `rest` body in a pose, frame of the pose, metres, shape `[vertices]`; `bones` become those of the pose.

@@ -3,10 +3,10 @@
 use super::parts::BodyParts;
 use super::pose_shapes::ENTRIES;
 use super::{BodyError, Joint, PoseShapes, ShapeSpace, Skeleton, SkinWeights};
-use crate::math::P3;
-use crate::mesh::{Topology, TriMesh};
 use nalgebra::Point3;
 use std::sync::Arc;
+use tryon_geometry::math::P3;
+use tryon_geometry::mesh::{Topology, TriMesh};
 
 /// A rigged body in its rest pose: y up, facing +z, metres. Immutable; share it by `Arc`.
 #[derive(Clone, Debug)]

@@ -6,15 +6,15 @@ pub use super::capture_header::CaptureHeader;
 use super::capture_header::{check_body, check_header};
 use super::texture::GarmentTexture;
 use super::unpose::unpose_shaped;
-use crate::body::Template;
-use crate::formats::FormatError;
-use crate::formats::image::{read_color, write_png_rgb};
-use crate::formats::npy::{read_npy, write_npy};
-use crate::math::V3;
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
+use tryon_body::Template;
+use tryon_formats::FormatError;
+use tryon_formats::image::{read_color, write_png_rgb};
+use tryon_formats::npy::{read_npy, write_npy};
+use tryon_geometry::math::V3;
 
 /// Version of the layout. A folder of another one is refused.
 const VERSION: u32 = 2;

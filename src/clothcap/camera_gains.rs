@@ -7,13 +7,13 @@
 use super::align::Alignment;
 use super::scan::BodyScan;
 use super::segment::{BodyRegion, bone_slices};
-use crate::body::Template;
-use crate::math::V3;
-use crate::mesh::vertex_normals;
-use crate::par::Par;
 use nalgebra::{SMatrix, SVector};
 use std::collections::BTreeMap;
 use std::f32::consts::TAU;
+use tryon_body::Template;
+use tryon_geometry::math::V3;
+use tryon_geometry::mesh::vertex_normals;
+use tryon_geometry::par::Par;
 
 /// Azimuths at which the gain is known, 15° apart.
 const AZIMUTHS: usize = 24;
@@ -211,9 +211,9 @@ fn reweigh(ring: &[(usize, RingColor)], channel: usize, (gains, weights): (&Gain
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::body::{BodyShape, BoneTransforms, Pose, embedded};
-    use crate::clothcap::align::{AlignedBody, AlignmentReport, SurfaceMatch};
-    use crate::math::{P3, Rigid};
+    use crate::align::{AlignedBody, AlignmentReport, SurfaceMatch};
+    use tryon_body::{BodyShape, BoneTransforms, Pose, embedded};
+    use tryon_geometry::math::{P3, Rigid};
 
     /// A point on each vertex of the template, painted by place, seen by a camera in front and one behind that differ by
     /// `gains`; and without their gains.

@@ -18,10 +18,10 @@ use super::undress::{
     ShapeScan, Undressed, Undresser, WornGarments, minimally_clothed, posed_under_cloth,
 };
 use super::unpose::unpose_shaped;
-use crate::body::{BodyShape, Template};
-use crate::math::{P3, V3};
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
+use tryon_body::{BodyShape, Template};
+use tryon_geometry::math::{P3, V3};
 
 /// Mean robust distance of a scan from the body model above which it says nothing of the subject's shape, metres.
 const MISALIGNED: f64 = 0.03;
@@ -377,8 +377,8 @@ fn displacements(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::body::embedded;
-    use crate::clothcap::test_scans::TestScan;
+    use crate::test_scans::TestScan;
+    use tryon_body::embedded;
 
     /// A weight that is not a number fails the fit of the parts after the scan is segmented.
     #[test]

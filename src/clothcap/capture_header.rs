@@ -6,10 +6,10 @@ use super::captured_outfit::CapturedOutfit;
 use super::multi::ClothPart;
 use super::scan::ScanFrame;
 use super::topology::ClothTemplate;
-use crate::body::Template;
-use crate::math::P3;
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
+use tryon_body::Template;
+use tryon_geometry::math::P3;
 
 /// Outfit of a capture and the state that later scans start from.
 #[derive(Clone, Debug, Serialize, Deserialize)]

@@ -4,8 +4,8 @@ use super::align::AlignedBody;
 use super::multi::MultiCloth;
 use super::segment::Labelling;
 use super::texture::TextureAtlas;
-use crate::math::P3;
 use serde::{Deserialize, Serialize};
+use tryon_geometry::math::P3;
 
 /// Outfit found in the first scan.
 #[derive(Clone, Debug, Serialize, Deserialize)]

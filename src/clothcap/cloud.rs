@@ -1,9 +1,9 @@
 //! Neighbours in a cloud without faces: normals, edges and strays.
 
-use crate::math::{P3, V3};
-use crate::par::{self, Par};
-use crate::spatial::HashGrid;
 use nalgebra::{Matrix3, Vector3};
+use tryon_geometry::math::{P3, V3};
+use tryon_geometry::par::{self, Par};
+use tryon_geometry::spatial::HashGrid;
 
 /// Neighbours of a point in the plane of its normal: the fewest that make a plane.
 const NEIGHBOURS: [usize; 5] = [12, 24, 48, 96, 192];

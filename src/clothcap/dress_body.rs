@@ -6,11 +6,11 @@ use super::layers::clear_body;
 use super::multi::MultiCloth;
 use super::retarget::{PenetrationSolver, RetargetReport, SolidBody, on_body, pose_part};
 use super::topology::ClothTemplate;
-use crate::body::{BoneTransforms, Pose, RestBody, Template};
-use crate::math::{P3, V3, World};
-use crate::par::Par;
-use crate::tracking::ArmClearance;
 use std::sync::Arc;
+use tryon_body::{BoneTransforms, Pose, RestBody, Template};
+use tryon_geometry::math::{P3, V3, World};
+use tryon_geometry::par::Par;
+use tryon_tracking::ArmClearance;
 
 /// Dressed body in one pose.
 #[derive(Clone, Debug)]

@@ -1,6 +1,6 @@
 //! Edges of faces that need not be manifold.
 
-use crate::mesh::{Csr, Face};
+use tryon_geometry::mesh::{Csr, Face};
 
 /// Directed sides of a face.
 pub(super) fn sides(f: &Face) -> [[u32; 2]; 3] {

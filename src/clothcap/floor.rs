@@ -1,9 +1,9 @@
 //! Floor below a person in a scan: a plane that the rest stands on.
 
-use crate::math::{P3, V3, principal_axes};
 use rand::{Rng, SeedableRng};
 use rand_pcg::Pcg32;
 use std::collections::HashSet;
+use tryon_geometry::math::{P3, V3, principal_axes};
 
 /// Points that planes are searched among.
 const SAMPLES: usize = 2000;
@@ -210,7 +210,7 @@ pub(super) fn inner_range(values: impl Iterator<Item = f32>, strays: f64) -> [f3
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::body::embedded;
+    use tryon_body::embedded;
 
     /// The template's vertices, and a floor of `size` metres under its feet, with `count` points, turned by `tilt` about x.
     fn person_on_floor(size: f32, count: usize, tilt: f32) -> Vec<P3> {

@@ -3,7 +3,7 @@
 use super::CaptureError;
 use super::multi::MultiCloth;
 use super::retarget::{PenetrationSolver, RetargetReport, SolidBody};
-use crate::math::P3;
+use tryon_geometry::math::P3;
 
 /// Place of a hidden vertex between skin and the garment above, 0 to 1.
 const DEPTH: f32 = 0.5;
@@ -56,8 +56,8 @@ fn tuck_hidden(cloth: &MultiCloth, garments: &mut [Vec<P3>], body: &[P3]) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::clothcap::multi::ClothPart;
-    use crate::clothcap::segment::Slot;
+    use crate::multi::ClothPart;
+    use crate::segment::Slot;
 
     #[test]
     fn hidden_vertices_lie_halfway() {

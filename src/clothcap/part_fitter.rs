@@ -11,8 +11,8 @@ use super::segmenter::SegmentedScan;
 use super::texture::TextureAtlas;
 use super::topology::ClothTemplate;
 use super::unpose::unpose_shaped;
-use crate::body::BoneTransforms;
-use crate::math::P3;
+use tryon_body::BoneTransforms;
+use tryon_geometry::math::P3;
 
 /// Side of a texel over the distance between the scan's colours, and its limits, metres.
 const TEXEL: f32 = 0.5;

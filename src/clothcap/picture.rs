@@ -5,13 +5,13 @@ use super::captured_outfit::CapturedOutfit;
 use super::scan::BodyScan;
 use super::texture::{GarmentTexture, TextureAtlas};
 use super::topology::ClothTemplate;
-use crate::body::Pose;
-use crate::camera::ColorImage;
-use crate::math::{P3, V3, World};
-use crate::mesh::Face;
-use crate::par::Par;
-use crate::raster::{Options, View, VisibilityBuffer, interpolate, rasterise_with};
 use nalgebra::{Rotation3, Vector3};
+use tryon_body::Pose;
+use tryon_geometry::camera::ColorImage;
+use tryon_geometry::math::{P3, V3, World};
+use tryon_geometry::mesh::Face;
+use tryon_geometry::par::Par;
+use tryon_geometry::raster::{Options, View, VisibilityBuffer, interpolate, rasterise_with};
 
 /// Scale, pixels a metre.
 const SCALE: f32 = 300.0;

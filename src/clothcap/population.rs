@@ -1,9 +1,9 @@
 //! A population: bodies drawn from the shape space (section 6.4).
 
-use crate::body::embedded::RANGE;
-use crate::body::{BodyShape, Template};
 use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
+use tryon_body::embedded::RANGE;
+use tryon_body::{BodyShape, Template};
 
 /// Shapes of `count` bodies, the same for the same seed: normally distributed coefficients within the sound range.
 pub fn population(template: &Template, count: usize, seed: u64) -> Vec<BodyShape> {
@@ -24,7 +24,7 @@ pub fn population(template: &Template, count: usize, seed: u64) -> Vec<BodyShape
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::body::embedded;
+    use tryon_body::embedded;
 
     #[test]
     fn bodies_differ_and_repeat() {

@@ -5,13 +5,13 @@ use super::align::{QuadraticEnergy, Stencil};
 use super::face_edges::edges;
 use super::multi::ClothPart;
 use super::unpose::blended;
-use crate::body::{BoneTransforms, Template};
-use crate::cloth::{Config, collision_model};
-use crate::contact::{ClosestPoint, CollisionBody, CollisionModel, CollisionWorkspace, Part};
-use crate::math::{P3, V3};
-use crate::par::{self, Par};
-use crate::spatial::Bvh;
 use serde::{Deserialize, Serialize};
+use tryon_body::{BoneTransforms, Template};
+use tryon_cloth::contact::{ClosestPoint, CollisionBody, CollisionModel, CollisionWorkspace, Part};
+use tryon_cloth::{Config, collision_model};
+use tryon_geometry::math::{P3, V3};
+use tryon_geometry::par::{self, Par};
+use tryon_geometry::spatial::Bvh;
 
 /// Distance that cloth keeps from the skin, metres.
 const MARGIN: f32 = 0.003;

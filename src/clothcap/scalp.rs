@@ -1,7 +1,7 @@
 //! Scalp: the part of the head that hair covers.
 
-use crate::body::Template;
-use crate::body::parts::BodySegment;
+use tryon_body::Template;
+use tryon_body::parts::BodySegment;
 
 /// Height of the hairline between chin and crown.
 const HAIRLINE: f32 = 0.78;
@@ -26,7 +26,7 @@ pub(super) fn scalp(template: &Template) -> Vec<bool> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::body::embedded;
+    use tryon_body::embedded;
 
     #[test]
     fn the_scalp_is_behind_and_above_the_face() {

@@ -8,9 +8,9 @@ use super::segment::{
     LabelConfig, Labelling, NodeColors, label_nodes, label_scan, relabel_nodes, seen_slices,
 };
 use super::topology::ClothTemplate;
-use crate::body::Template;
-use crate::mesh::Csr;
 use std::sync::Arc;
+use tryon_body::Template;
+use tryon_geometry::mesh::Csr;
 
 /// Farthest that a point of a garment lies off the surface, metres: the surface follows cloth to a few millimetres.
 const FARTHEST: f32 = 0.10;

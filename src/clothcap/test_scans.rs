@@ -2,13 +2,13 @@
 
 use super::scan::{BodyScan, ScanFrame};
 use super::segment::BodyRegion;
-use crate::body::{BodyShape, BoneTransforms, Pose, embedded, skin};
-use crate::formats::scan::ScanMesh;
-use crate::math::{P3, Rigid, V3, World};
-use crate::mesh::{Face, Topology, vertex_normals};
-use crate::par::Par;
 use nalgebra::{UnitQuaternion, Vector3};
 use rand::{Rng, SeedableRng};
+use tryon_body::{BodyShape, BoneTransforms, Pose, embedded, skin};
+use tryon_formats::scan::ScanMesh;
+use tryon_geometry::math::{P3, Rigid, V3, World};
+use tryon_geometry::mesh::{Face, Topology, vertex_normals};
+use tryon_geometry::par::Par;
 
 /// Points of a test scan.
 const POINTS: usize = 20_000;

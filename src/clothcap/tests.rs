@@ -4,9 +4,9 @@ use super::archive::{CaptureArchive, CaptureHeader, FrameDisplacements, FrameRec
 use super::segment::{LabelConfig, Slot};
 use super::test_scans::{TestScan, f1};
 use super::*;
-use crate::body::{BodyShape, embedded};
-use crate::math::P3;
-use crate::spatial::Bvh;
+use tryon_body::{BodyShape, embedded};
+use tryon_geometry::math::P3;
+use tryon_geometry::spatial::Bvh;
 
 const BLUE: [u8; 3] = [60, 90, 190];
 const GREY: [u8; 3] = [70, 70, 75];
@@ -188,7 +188,7 @@ fn displacements_of_another_outfit_are_refused() {
     let cloth = multi::MultiCloth::default();
     let mut dresser = BodyDresser::new(template.clone(), &cloth).expect("a dresser");
     let body = template.personalise(&BodyShape::default());
-    let pose = crate::body::Pose::rest(template.skeleton(), crate::math::Rigid::identity());
+    let pose = tryon_body::Pose::rest(template.skeleton(), tryon_geometry::math::Rigid::identity());
     let refused = dresser.dress(&body, &FrameDisplacements::default(), &pose);
     assert!(matches!(refused, Err(CaptureError::Displacements { .. })));
 }

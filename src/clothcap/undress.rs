@@ -8,13 +8,13 @@ use super::align::{
 use super::multi::MultiCloth;
 use super::retarget::SolidBody;
 use super::scan::BodyScan;
-use crate::body::{BodyShape, BoneTransforms, Template};
-use crate::math::P3;
-use crate::mesh::face_normal;
-use crate::par::{self, Par};
-use crate::registration::GemanMcClure;
-use crate::spatial::Bvh;
 use std::sync::Arc;
+use tryon_body::{BodyShape, BoneTransforms, Template};
+use tryon_geometry::math::P3;
+use tryon_geometry::mesh::face_normal;
+use tryon_geometry::par::{self, Par};
+use tryon_geometry::spatial::Bvh;
+use tryon_tracking::registration::GemanMcClure;
 
 /// Scan points in the fit of the shape.
 const SAMPLES: usize = 6000;

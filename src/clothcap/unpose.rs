@@ -1,8 +1,8 @@
 //! Unposing (eq. 8): rest positions that pose blend shapes and blend skinning take to given posed ones.
 
-use crate::body::{BoneTransforms, SkinWeights, Template};
-use crate::math::P3;
 use nalgebra::{Matrix4, Point3};
+use tryon_body::{BoneTransforms, SkinWeights, Template};
+use tryon_geometry::math::P3;
 
 /// Least determinant of a vertex's blended transform. Opposite bones blend to nothing where a joint is folded shut.
 const FLAT: f64 = 1e-3;
@@ -64,9 +64,9 @@ pub fn unpose(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::body::{BodyShape, Pose, PoseShapes, embedded};
-    use crate::math::{Rigid, World};
-    use crate::par::Par;
+    use tryon_body::{BodyShape, Pose, PoseShapes, embedded};
+    use tryon_geometry::math::{Rigid, World};
+    use tryon_geometry::par::Par;
 
     /// Largest distance of unposed vertices from those that were posed, metres.
     fn round_trip(template: &Template) -> f32 {

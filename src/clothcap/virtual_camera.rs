@@ -2,11 +2,11 @@
 
 use super::cloud::mean_spacing;
 use super::scan::{BodyScan, axis_range};
-use crate::camera::{Calibration, DepthImage, Intrinsics, RgbdFrame};
-use crate::math::{Camera, P3, Rigid, World};
-use crate::par::Par;
-use crate::raster::{Options, View, VisibilityBuffer, rasterise_with};
 use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
+use tryon_geometry::camera::{Calibration, DepthImage, Intrinsics, RgbdFrame};
+use tryon_geometry::math::{Camera, P3, Rigid, World};
+use tryon_geometry::par::Par;
+use tryon_geometry::raster::{Options, View, VisibilityBuffer, rasterise_with};
 
 /// Columns, rows and focal length, pixels: those of the sensors that the tracker is made for.
 const SIZE: [u32; 2] = [480, 640];

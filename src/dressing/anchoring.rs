@@ -1,11 +1,11 @@
 //! Anchors tied to the skin below them.
 
 use super::waistband::{GarmentOnSkin, spread};
-use crate::cloth::AnchorBinding;
-use crate::cloth::{ClothError, Sheet};
-use crate::contact::SurfaceFrame;
-use crate::garment::{AnchorKind, Region};
-use crate::math::P3;
+use tryon_cloth::AnchorBinding;
+use tryon_cloth::contact::SurfaceFrame;
+use tryon_cloth::{ClothError, Sheet};
+use tryon_garment::{AnchorKind, Region};
+use tryon_geometry::math::P3;
 
 impl GarmentOnSkin<'_> {
     /// Ties the anchors `offset` metres off the skin, waistbands evenly stretched.
@@ -69,7 +69,7 @@ fn rigid_binding(vertex: u32, at: &P3, body: [u32; 3], frame: &SurfaceFrame) -> 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::math::V3;
+    use tryon_geometry::math::V3;
 
     #[test]
     fn a_rigid_binding_reproduces_the_position_and_survives_a_triangle_without_area() {

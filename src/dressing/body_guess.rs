@@ -3,12 +3,12 @@
 use super::error::MeshGarmentError;
 use super::file_frame::{FileFrame, bounds};
 use super::skin_binding::skin_normals;
-use crate::body::{BodyShape, BoneTransforms, Pose, RestBody, Template, skin};
-use crate::math::{Body, P3, Rigid, V3, World, log_so3};
-use crate::par::Par;
-use crate::spatial::PointTree;
 use nalgebra::{UnitQuaternion, Vector3};
 use std::sync::Arc;
+use tryon_body::{BodyShape, BoneTransforms, Pose, RestBody, Template, skin};
+use tryon_geometry::math::{Body, P3, Rigid, V3, World, log_so3};
+use tryon_geometry::par::Par;
+use tryon_geometry::spatial::PointTree;
 
 /// Limits of a garment's largest extent, metres; they decide the file's unit.
 const EXTENT: [f32; 2] = [0.22, 2.2];
@@ -212,7 +212,7 @@ impl<'a> GuessFit<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::body::embedded;
+    use tryon_body::embedded;
 
     #[test]
     fn locate_finds_unit_and_shift_of_a_garment_that_is_an_offset_skin() {

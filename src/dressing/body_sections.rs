@@ -1,13 +1,13 @@
 //! Cross-sections of a body in the canonical pose, for placing panels around it.
 
-use crate::body::measure::Measurements;
-use crate::body::parts::vertex_masks;
-use crate::body::{BoneTransforms, RestBody, Template, skin};
-use crate::garment::Region;
-use crate::math::{P3, P3d};
-use crate::mesh::Face;
-use crate::par::Par;
 use std::ops::Range;
+use tryon_body::measure::Measurements;
+use tryon_body::parts::vertex_masks;
+use tryon_body::{BoneTransforms, RestBody, Template, skin};
+use tryon_garment::Region;
+use tryon_geometry::math::{P3, P3d};
+use tryon_geometry::mesh::Face;
+use tryon_geometry::par::Par;
 
 /// Distance between two cross-sections, metres: wider misses waists, narrower only costs time.
 const SPACING: f32 = 0.01;

@@ -1,10 +1,10 @@
 //! Affine map of each bone from one body to another: turned, stretched to the other's length and widened to its girth.
 
 use super::body_sections::BodySections;
-use crate::body::parts::mean_radius;
-use crate::body::{Joint, Template};
-use crate::math::{P3, P3d, V3d};
 use nalgebra::{Matrix3, UnitQuaternion, center};
+use tryon_body::parts::mean_radius;
+use tryon_body::{Joint, Template};
+use tryon_geometry::math::{P3, P3d, V3d};
 
 /// Lengths below this have no ratio, metres.
 const SHORTEST: f64 = 1e-3;

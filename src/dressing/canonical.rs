@@ -1,8 +1,8 @@
 //! The canonical pose in which garments are put on: upright, arms out and a little down, legs a little apart.
 
-use crate::body::{JointMotion, Pose, RestBody, Template};
-use crate::math::{Body, Rigid, V3d, World, log_so3};
 use nalgebra::{Unit, UnitQuaternion, Vector3};
+use tryon_body::{JointMotion, Pose, RestBody, Template};
+use tryon_geometry::math::{Body, Rigid, V3d, World, log_so3};
 
 /// Upper arms below the horizontal, radians: armpits open, shoulders not shrugged.
 const ARMS_DOWN: f64 = 0.60;

@@ -5,15 +5,15 @@ use super::error::DressError;
 use super::options::{DressOptions, DressReport, ms};
 use super::outfit_drape::{Wearer, drape_outfit};
 use super::sew::{GarmentSource, Sewing};
-use crate::body::measure::measure;
-use crate::body::{Pose, RestBody, Template};
-use crate::cloth::{ClothError, Config, Model, Outfit, State};
-use crate::garment::{GarmentMesh, Pattern};
-use crate::math::World;
-use crate::par::join;
 use std::time::Instant;
+use tryon_body::measure::measure;
+use tryon_body::{Pose, RestBody, Template};
+use tryon_cloth::{ClothError, Config, Model, Outfit, State};
+use tryon_garment::{GarmentMesh, Pattern};
+use tryon_geometry::math::World;
+use tryon_geometry::par::join;
 
-/// A dressed body, ready for [`crate::cloth::step`].
+/// A dressed body, ready for [`tryon_cloth::step`].
 #[derive(Debug)]
 pub struct Dressed {
     /// Immutable part; wrap it in an `Arc` to share it.
@@ -130,9 +130,9 @@ fn check_pose(template: &Template, pose: &Pose<World>) -> Result<(), DressError>
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::body::{BodyShape, embedded};
-    use crate::garment::{Size, library};
-    use crate::math::Rigid;
+    use tryon_body::{BodyShape, embedded};
+    use tryon_garment::{Size, library};
+    use tryon_geometry::math::Rigid;
 
     #[test]
     fn empty_lists_and_faulty_poses_are_refused() {

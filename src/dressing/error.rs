@@ -1,10 +1,10 @@
 //! Faults of dressing.
 
 use super::suggest::Misfit;
-use crate::body::BodyError;
-use crate::cloth::ClothError;
-use crate::formats::FormatError;
-use crate::garment::GarmentError;
+use tryon_body::BodyError;
+use tryon_cloth::ClothError;
+use tryon_formats::FormatError;
+use tryon_garment::GarmentError;
 
 /// Why a garment could not be put on.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]

@@ -1,6 +1,6 @@
 //! Unit and frame of a mesh file.
 
-use crate::math::{P3, V3};
+use tryon_geometry::math::{P3, V3};
 
 /// Map from a file's own unit and frame to metres, y up.
 #[derive(Clone, Copy, Debug, PartialEq)]

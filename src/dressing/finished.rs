@@ -1,7 +1,7 @@
 //! Measures of a finished garment in one size, the input of size advice.
 
-use crate::body::measure::Measurements;
-use crate::garment::{GarmentKind, Material, Pattern, Placement, Size};
+use tryon_body::measure::Measurements;
+use tryon_garment::{GarmentKind, Material, Pattern, Placement, Size};
 
 /// Least ease at chest, waist and hip, metres: a waistband needs none, it sits lower on a fuller body.
 pub(super) const LEAST_EASE: [f64; 3] = [0.04, -0.03, 0.02];

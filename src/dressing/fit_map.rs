@@ -4,16 +4,16 @@
 //! solver's state will do; in fast motion inertia reads as pressure.
 
 use super::suggest::FitClass;
-use crate::body::Template;
-use crate::body::parts::{BodySegment, BodySide};
-use crate::cloth::{ClothError, Sheet};
-use crate::cloth::{Model, State};
-use crate::contact::{SurfaceFrame, SurfaceModel};
-use crate::garment::{GarmentMesh, Region};
-use crate::math::{P3, V3d};
-use crate::par::Par;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
+use tryon_body::Template;
+use tryon_body::parts::{BodySegment, BodySide};
+use tryon_cloth::contact::{SurfaceFrame, SurfaceModel};
+use tryon_cloth::{ClothError, Sheet};
+use tryon_cloth::{Model, State};
+use tryon_garment::{GarmentMesh, Region};
+use tryon_geometry::math::{P3, V3d};
+use tryon_geometry::par::Par;
 
 /// Fit at one vertex of a garment.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -333,9 +333,9 @@ impl WornGarment<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::garment::{GarmentKind, Material, RenderMesh, Size};
-    use crate::mesh::{Face, Topology, TriMesh};
     use std::f64::consts::TAU;
+    use tryon_garment::{GarmentKind, Material, RenderMesh, Size};
+    use tryon_geometry::mesh::{Face, Topology, TriMesh};
 
     /// An open tube about y, radius `r`, `n` × `m` cells, 0.3 m high; faces outward.
     fn tube(r: f64, n: u32, m: u32) -> (Vec<P3>, Vec<Face>) {

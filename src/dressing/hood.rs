@@ -3,12 +3,12 @@
 //! A placed hood is free of itself, but lies back in three layers with edges far from their lengths. Released, it would spring
 //! through itself, and three intersecting layers cannot be untangled.
 
-use crate::cloth::Sheet;
-use crate::cloth::contact::self_contact::{Search, SelfContactFrame, SelfContactModel};
-use crate::contact::SurfaceModel;
-use crate::garment::{GarmentError, GarmentMesh, Placement};
-use crate::math::{P3, V3, V3d};
-use crate::par::Par;
+use tryon_cloth::Sheet;
+use tryon_cloth::contact::SurfaceModel;
+use tryon_cloth::self_contact::{Search, SelfContactFrame, SelfContactModel};
+use tryon_garment::{GarmentError, GarmentMesh, Placement};
+use tryon_geometry::math::{P3, V3, V3d};
+use tryon_geometry::par::Par;
 
 /// Distance of two folds (m); at most a quarter of the edges.
 const THICKNESS: f32 = 0.01;
@@ -145,7 +145,7 @@ impl Hood {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::garment::{Side, Size, Triangulation, library};
+    use tryon_garment::{Side, Size, Triangulation, library};
 
     fn sewn(name: &str) -> (GarmentMesh, Option<Hood>) {
         let pattern = library::pattern(name, Size::M).expect("pattern");

@@ -1,8 +1,8 @@
 //! Settings and report of dressing.
 
-use crate::cloth::Config;
-use crate::garment::Triangulation;
 use std::time::Instant;
+use tryon_cloth::Config;
+use tryon_garment::Triangulation;
 
 /// Settings of dressing.
 #[derive(Clone, Debug, PartialEq)]

@@ -8,13 +8,13 @@ use super::refine::prolong;
 use super::sew::PlacedSheet;
 use super::skin::{Skin, SkinModel};
 use super::waistband::GarmentOnSkin;
-use crate::body::{BoneTransforms, Pose, RestBody, Template};
-use crate::cloth::{AnchorBinding, ClothError, Sheet};
-use crate::contact::CollisionBody;
-use crate::garment::GarmentMesh;
-use crate::math::{P3, World};
-use crate::spatial::intersections;
 use std::time::Instant;
+use tryon_body::{BoneTransforms, Pose, RestBody, Template};
+use tryon_cloth::contact::CollisionBody;
+use tryon_cloth::{AnchorBinding, ClothError, Sheet};
+use tryon_garment::GarmentMesh;
+use tryon_geometry::math::{P3, World};
+use tryon_geometry::spatial::intersections;
 
 /// Substep on the coarse mesh, s.
 const COARSE_STEP: f64 = 2e-3;
@@ -291,8 +291,8 @@ fn on_skin<'a>(skin: &'a Skin<'_>, mesh: &'a GarmentMesh, offset: f64) -> Garmen
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::body::{BodyShape, embedded};
-    use crate::math::Rigid;
+    use tryon_body::{BodyShape, embedded};
+    use tryon_geometry::math::Rigid;
 
     #[test]
     fn bodies_between_two_poses_start_and_end_at_them() {

@@ -1,6 +1,6 @@
 //! Contact plane of one vertex of a garment being draped.
 
-use crate::math::V3d;
+use tryon_geometry::math::V3d;
 
 /// Length of the difference of two skins' normals from which they face each other: √2 at a right angle.
 const FACING: f64 = 1.41;

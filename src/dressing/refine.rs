@@ -1,7 +1,7 @@
 //! Prolongation: positions of a fine mesh from those of a coarse one of the same pattern, through the flat panels.
 
-use crate::garment::GarmentMesh;
-use crate::math::V3d;
+use tryon_garment::GarmentMesh;
+use tryon_geometry::math::V3d;
 
 /// Interpolates linearly in the coarse triangle that contains each fine vertex on its panel.
 ///
@@ -57,7 +57,7 @@ fn weights(t: &[[f64; 2]; 3], q: [f64; 2]) -> [f64; 3] {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::garment::{Size, Triangulation, library};
+    use tryon_garment::{Size, Triangulation, library};
 
     #[test]
     fn prolongation_reproduces_a_linear_map_of_the_panels() {

@@ -5,12 +5,12 @@
 use super::body_sections::BodySections;
 use super::bone_map::{BoneMap, bone_maps};
 use super::skin_binding::skin_normals;
-use crate::body::Template;
-use crate::body::parts::vertex_masks;
-use crate::garment::Region;
-use crate::math::{P3, P3d, V3, V3d};
-use crate::mesh::smoothing::mean;
-use crate::spatial::PointTree;
+use tryon_body::Template;
+use tryon_body::parts::vertex_masks;
+use tryon_garment::Region;
+use tryon_geometry::math::{P3, P3d, V3, V3d};
+use tryon_geometry::mesh::smoothing::mean;
+use tryon_geometry::spatial::PointTree;
 
 /// Target skin farther than this from the mapped source skin is not its counterpart, metres: a belly's depth.
 const REACH: f32 = 0.15;
@@ -132,7 +132,7 @@ impl<'a> TargetSkin<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::body::{BodyShape, embedded};
+    use tryon_body::{BodyShape, embedded};
 
     #[test]
     fn a_body_retargeted_to_itself_keeps_its_hips_and_to_a_heavy_one_reaches_its_skin() {

@@ -1,14 +1,14 @@
 //! A skeleton for a bare standing body, found by tracking the embedded template onto a rendered depth image of it.
 
-use crate::body::{BoneTransforms, Pose, RestBody, Template, embedded, rig, skin};
-use crate::camera::{Calibration, DepthImage, Intrinsics, RgbdFrame};
-use crate::math::{Camera, Rigid, V3d, World};
-use crate::mesh::TriMesh;
-use crate::par::Par;
-use crate::raster::{View, VisibilityBuffer, rasterise};
-use crate::spatial::PointTree;
-use crate::tracking::{TrackerConfig, TrackerModel, TrackerState, Workspace, step};
 use nalgebra::{UnitQuaternion, Vector3};
+use tryon_body::{BoneTransforms, Pose, RestBody, Template, embedded, rig, skin};
+use tryon_geometry::camera::{Calibration, DepthImage, Intrinsics, RgbdFrame};
+use tryon_geometry::math::{Camera, Rigid, V3d, World};
+use tryon_geometry::mesh::TriMesh;
+use tryon_geometry::par::Par;
+use tryon_geometry::raster::{View, VisibilityBuffer, rasterise};
+use tryon_geometry::spatial::PointTree;
+use tryon_tracking::{TrackerConfig, TrackerModel, TrackerState, Workspace, step};
 
 /// Frames that the tracker gets of the standing body: enough to find it and to calibrate its proportions.
 const FRAMES: u64 = 45;

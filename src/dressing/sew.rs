@@ -7,10 +7,10 @@ use super::mesh_garment::MeshGarment;
 use super::options::DressOptions;
 use super::place::place;
 use super::suggest::check_wearable;
-use crate::body::Template;
-use crate::body::measure::Measurements;
-use crate::garment::{AnchorKind, GarmentMesh, Pattern, Size, Triangulation, library};
-use crate::math::P3;
+use tryon_body::Template;
+use tryon_body::measure::Measurements;
+use tryon_garment::{AnchorKind, GarmentMesh, Pattern, Size, Triangulation, library};
+use tryon_geometry::math::P3;
 
 /// Edge length of the mesh that is draped first over that of the garment: four times fewer vertices.
 const COARSER: f64 = 2.0;

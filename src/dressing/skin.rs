@@ -1,14 +1,14 @@
 //! Collision body of a drape.
 
-use crate::body::Template;
-use crate::body::parts::vertex_masks;
-use crate::cloth::repair::sleeve_rings::{Arms, CentreLine};
-use crate::cloth::{ClothError, Config, collision_model};
-use crate::contact::{
+use tryon_body::Template;
+use tryon_body::parts::vertex_masks;
+use tryon_cloth::contact::{
     ClosestPoint, CollisionBody, CollisionError, CollisionModel, CollisionWorkspace, Part,
     SkinGrid, SurfaceFrame, SurfaceModel,
 };
-use crate::math::P3;
+use tryon_cloth::sleeve_rings::{Arms, CentreLine};
+use tryon_cloth::{ClothError, Config, collision_model};
+use tryon_geometry::math::P3;
 
 /// Immutable part of [`Skin`].
 #[derive(Debug)]

@@ -1,12 +1,12 @@
 //! Points bound to the skin of a body: the vertices below them and the joints they follow.
 
-use crate::body::Template;
-use crate::math::{P3, V3};
-use crate::mesh::smoothing::half_mean;
-use crate::mesh::vertex_normals;
-use crate::par::Par;
-use crate::spatial::PointTree;
 use std::collections::BTreeMap;
+use tryon_body::Template;
+use tryon_geometry::math::{P3, V3};
+use tryon_geometry::mesh::smoothing::half_mean;
+use tryon_geometry::mesh::vertex_normals;
+use tryon_geometry::par::Par;
+use tryon_geometry::spatial::PointTree;
 
 /// Rounds of averaging over the garment: the nearest vertex jumps between neighbours, cloth does not.
 const ROUNDS: usize = 6;

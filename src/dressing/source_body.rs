@@ -4,14 +4,14 @@ use super::body_guess::{guess, locate};
 use super::error::MeshGarmentError;
 use super::file_frame::FileFrame;
 use super::rig_standing::rig_standing;
-use crate::body::import::template_from_smpl;
-use crate::body::{BodyError, Template, embedded};
-use crate::formats::npz::read_smpl;
-use crate::formats::obj::read_obj;
-use crate::math::{P3, V3};
-use crate::mesh::{Face, MeshError, Topology, TriMesh};
 use std::path::Path;
 use std::sync::Arc;
+use tryon_body::import::template_from_smpl;
+use tryon_body::{BodyError, Template, embedded};
+use tryon_formats::npz::read_smpl;
+use tryon_formats::obj::read_obj;
+use tryon_geometry::math::{P3, V3};
+use tryon_geometry::mesh::{Face, MeshError, Topology, TriMesh};
 
 /// Limits of a grown body's stature, metres; they decide the file's unit.
 const STATURE: [f32; 2] = [1.1, 2.4];

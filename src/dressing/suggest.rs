@@ -1,8 +1,8 @@
 //! Size choice: ease of each size on a measured body, with its reason in words.
 
 use super::finished::FinishedGarment;
-use crate::body::measure::Measurements;
-use crate::garment::{GarmentError, GarmentKind, Size, library};
+use tryon_body::measure::Measurements;
+use tryon_garment::{GarmentError, GarmentKind, Size, library};
 
 /// Class of the fit at one place.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
@@ -391,7 +391,7 @@ mod tests {
         assert!(none.to_string().contains("no size"), "{none}");
         // A knit gives more than denim.
         let give = |n: &str| {
-            crate::garment::Material::preset(n)
+            tryon_garment::Material::preset(n)
                 .expect("preset")
                 .comfortable_strain()
         };

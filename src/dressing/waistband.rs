@@ -1,9 +1,9 @@
 //! Even spreading of a waistband around the body before it is tied, so that no part of it is pulled more than another.
 
-use crate::contact::{SurfaceFrame, SurfaceModel};
-use crate::garment::{AnchorKind, GarmentMesh, Region};
-use crate::math::P3;
 use std::collections::{BTreeMap, BTreeSet};
+use tryon_cloth::contact::{SurfaceFrame, SurfaceModel};
+use tryon_garment::{AnchorKind, GarmentMesh, Region};
+use tryon_geometry::math::P3;
 
 /// Parts that a waistband may lie on.
 const HIPS: Region = Region::TRUNK.with(Region::LEFT_LEG).with(Region::RIGHT_LEG);
@@ -60,10 +60,10 @@ pub(super) fn spread(on: &GarmentOnSkin<'_>, edges: &[([u32; 2], f64)], position
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::cloth::Sheet;
-    use crate::garment::{Size, Triangulation, library};
-    use crate::mesh::{Face, Topology, TriMesh};
-    use crate::par::Par;
+    use tryon_cloth::Sheet;
+    use tryon_garment::{Size, Triangulation, library};
+    use tryon_geometry::mesh::{Face, Topology, TriMesh};
+    use tryon_geometry::par::Par;
 
     /// A tube of radius `r` around the y axis.
     fn tube(r: f32) -> TriMesh {

@@ -3,11 +3,11 @@
 use super::FormatError;
 use super::image::read_limited;
 use super::motion_clip::{CMU_PERIOD, MotionClip};
-use crate::math::{P3d, V3d};
 use nalgebra::UnitQuaternion;
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::str::SplitWhitespace;
+use tryon_geometry::math::{P3d, V3d};
 
 /// Largest file, bytes. An hour at 120 Hz takes 350 MB as text; clips are minutes.
 const MAX_BYTES: u64 = 256 << 20;
@@ -403,7 +403,7 @@ impl AmcPose {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::formats::read_motion;
+    use crate::read_motion;
 
     const ASF: &str = ":version 1.10\n:units\n length 0.0254\n angle deg\n:root\n order TX TY TZ RX RY RZ\n:bonedata\n begin\n  id 1\n  name thigh\n  direction 0 -1 0\n  length 2\n  axis 0 0 90 XYZ\n  dof rx\n end\n begin\n  id 2\n  name shin\n  direction 0 -1 0\n  length 1\n  axis 0 0 0 XYZ\n  dof rz\n end\n:hierarchy\n begin\n  root thigh\n  thigh shin\n end\n";
 
@@ -452,7 +452,7 @@ mod tests {
 
     #[test]
     fn shared_clips_keep_bone_lengths_and_human_proportions() {
-        let Some(root) = crate::formats::shared_data("motion") else {
+        let Some(root) = crate::shared_data("motion") else {
             return;
         };
         for (file, frames, names) in [

@@ -3,9 +3,9 @@
 use super::FormatError;
 use super::image::read_limited;
 use super::motion_clip::MotionClip;
-use crate::math::{P3d, V3d};
 use nalgebra::{Isometry3, Translation3, UnitQuaternion};
 use std::path::Path;
+use tryon_geometry::math::{P3d, V3d};
 
 /// Largest file, bytes; an hour at 120 Hz with 60 channels takes 250 MB as text.
 const MAX_BYTES: u64 = 256 << 20;

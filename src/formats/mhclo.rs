@@ -2,8 +2,8 @@
 
 use super::FormatError;
 use super::image::read_limited;
-use crate::math::{P3, V3};
 use std::path::Path;
+use tryon_geometry::math::{P3, V3};
 
 /// Largest file, bytes; the largest shared suit has 700 kB.
 const MAX_BYTES: u64 = 64 << 20;

@@ -1,6 +1,6 @@
 //! Recorded motion: positions of every joint in every frame.
 
-use crate::math::P3d;
+use tryon_geometry::math::P3d;
 
 /// A motion clip. Lengths in the file's own unit (its user scales by bone lengths), y up.
 #[derive(Clone, Debug, Default, PartialEq)]

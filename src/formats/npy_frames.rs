@@ -2,10 +2,10 @@
 
 use super::FormatError;
 use super::npy::data_start;
-use crate::math::P3;
 use std::fs::{File, OpenOptions};
 use std::io::{Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
+use tryon_geometry::math::P3;
 
 /// Bytes before the values, at any number of frames.
 const HEADER: u64 = 128;
@@ -151,7 +151,7 @@ fn frame_bytes(vertices: usize) -> u64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::formats::npy::read_npy;
+    use crate::npy::read_npy;
 
     #[test]
     fn the_file_is_valid_after_each_frame_and_after_a_resume() {

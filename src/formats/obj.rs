@@ -3,10 +3,10 @@
 use super::FormatError;
 use super::image::read_limited;
 use super::obj_records::{ObjFaults, parse_records};
-use crate::math::P3;
-use crate::mesh::{Face, TriMesh};
 use std::fmt::Write as _;
 use std::path::Path;
+use tryon_geometry::math::P3;
+use tryon_geometry::mesh::{Face, TriMesh};
 
 /// Largest OBJ file that is read, bytes; a garment of 100,000 vertices takes about 12 MB.
 const MAX_BYTES: u64 = 512 << 20;

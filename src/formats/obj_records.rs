@@ -1,10 +1,10 @@
 //! Records of a Wavefront OBJ file: vertices with colours, texture coordinates, fanned faces and their materials.
 
 use super::FormatError;
-use crate::math::P3;
-use crate::mesh::Face;
 use std::path::Path;
 use std::str::SplitWhitespace;
+use tryon_geometry::math::P3;
+use tryon_geometry::mesh::Face;
 
 /// Records of a file; indices are in range.
 #[derive(Default)]

@@ -84,8 +84,8 @@ fn write_group(text: &mut String, mesh: &GlbMesh<'_>, first: usize) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::formats::scan::read_scan;
-    use crate::math::P3;
+    use crate::scan::read_scan;
+    use tryon_geometry::math::P3;
 
     #[test]
     fn meshes_are_read_back_with_their_texture() {
@@ -101,9 +101,9 @@ mod tests {
         };
         let image = folder.path().join("image.png");
         // Upper half green, lower half blue.
-        let pixels = crate::camera::ColorImage::new(1, 2, vec![0, 255, 0, 0, 0, 255]);
+        let pixels = tryon_geometry::camera::ColorImage::new(1, 2, vec![0, 255, 0, 0, 0, 255]);
         let pixels = pixels.expect("an image");
-        crate::formats::image::write_png_rgb(&image, &pixels).expect("written");
+        crate::image::write_png_rgb(&image, &pixels).expect("written");
         let png = std::fs::read(&image).expect("readable");
         let worn = GlbMesh {
             name: "top",

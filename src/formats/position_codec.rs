@@ -7,9 +7,9 @@
 //! Layout: one byte with the order; one zstd frame of LEB128 numbers, zigzag-coded, all x, then all y, then all z.
 
 use super::FormatError;
-use crate::math::P3;
-use crate::mesh::Face;
 use std::path::Path;
+use tryon_geometry::math::P3;
+use tryon_geometry::mesh::Face;
 
 /// Quantisation step of the coded positions, metres; decoded vertices are within half of it along each axis.
 pub const STEP: f64 = 2e-4;

@@ -39,10 +39,10 @@ pub(super) fn create_folders(path: &Path) -> io::Result<()> {
 #[cfg(unix)]
 #[cfg(test)]
 mod tests {
-    use crate::camera::{Calibration, ColorImage, DepthImage, Intrinsics, RgbdFrame};
-    use crate::formats::{McapWriter, RgbdFolderWriter};
+    use crate::{McapWriter, RgbdFolderWriter};
     use std::os::unix::fs::PermissionsExt;
     use std::path::Path;
+    use tryon_geometry::camera::{Calibration, ColorImage, DepthImage, Intrinsics, RgbdFrame};
 
     /// Modes of a file, or of a folder and everything in it.
     fn modes(path: &Path) -> Vec<u32> {

@@ -1,7 +1,7 @@
 //! Interface of every recording: a calibration and frames in order.
 
 use super::FormatError;
-use crate::camera::{Calibration, RgbdFrame};
+use tryon_geometry::camera::{Calibration, RgbdFrame};
 
 /// Frames of one camera, in capture order.
 pub trait RgbdSource: Send {

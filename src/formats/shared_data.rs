@@ -6,9 +6,9 @@ use std::path::{Path, PathBuf};
 ///
 /// # Panics
 /// With `TRYON_REQUIRE_ALL` set, where it is missing.
-pub(crate) fn shared_data(path: impl AsRef<Path>) -> Option<PathBuf> {
+pub fn shared_data(path: impl AsRef<Path>) -> Option<PathBuf> {
     let root = std::env::var_os("TRYON_SHARED").map_or_else(
-        || PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../shared"),
+        || PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../../shared"),
         PathBuf::from,
     );
     let full = root.join("data").join(path);

@@ -1,9 +1,9 @@
 //! Colours of a mesh's texture at points within its triangles: what vertices alone would lose.
 
-use crate::camera::ColorImage;
-use crate::formats::image::sample_texture;
-use crate::math::P3;
-use crate::mesh::{Face, face_normal};
+use crate::image::sample_texture;
+use tryon_geometry::camera::ColorImage;
+use tryon_geometry::math::P3;
+use tryon_geometry::mesh::{Face, face_normal};
 
 /// About the most points of a mesh: 2 mm apart on a person.
 const MOST_POINTS: usize = 500_000;
@@ -23,14 +23,14 @@ pub struct TexturePoint {
 
 /// Places of the points: evenly over the surface, no denser than the texels.
 #[derive(Clone, Copy, Debug)]
-pub(in crate::formats) struct TexturePoints {
+pub(crate) struct TexturePoints {
     /// Area of one point, square units of the mesh.
     area: f32,
 }
 
 impl TexturePoints {
     /// Points over these triangles, one of `parts` meshes that share the limit.
-    pub(in crate::formats) fn over(vertices: &[P3], faces: &[Face], parts: usize) -> Self {
+    pub(crate) fn over(vertices: &[P3], faces: &[Face], parts: usize) -> Self {
         let areas = faces.iter().map(|f| area(vertices, f));
         let total: f32 = areas.filter(|a| a.is_finite()).sum();
         Self {
@@ -40,7 +40,7 @@ impl TexturePoints {
 
     /// Adds the points of a triangle with texture coordinates, v down; `color` is that of the mesh at a colour of the image,
     /// both sRGB, 0 to 255.
-    pub(in crate::formats) fn add(
+    pub(crate) fn add(
         &self,
         (face, corners): (u32, [P3; 3]),
         (image, uv): (&ColorImage, [[f32; 2]; 3]),

@@ -66,5 +66,5 @@ pub enum GarmentError {
     },
     /// The sewn mesh is not a proper surface.
     #[error("sewn garment: {0}")]
-    Mesh(#[from] crate::mesh::MeshError),
+    Mesh(#[from] tryon_geometry::mesh::MeshError),
 }

@@ -1,7 +1,7 @@
 //! Image printed on a fabric.
 
-use crate::camera::ColorImage;
 use std::fmt;
+use tryon_geometry::camera::ColorImage;
 
 /// Image on a garment whose texture coordinates are metres from the image's upper left corner, v down.
 #[derive(Clone, PartialEq)]

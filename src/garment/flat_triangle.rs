@@ -22,7 +22,7 @@ pub(super) fn smallest_angle(t: &[[f64; 2]; 3]) -> f64 {
 }
 
 /// A triangle with positive area, widened across its longest side until its height is at least `share` of that.
-pub(crate) fn widened(mut t: [[f64; 2]; 3], share: f64) -> [[f64; 2]; 3] {
+pub fn widened(mut t: [[f64; 2]; 3], share: f64) -> [[f64; 2]; 3] {
     let side = |k: usize| {
         let (a, b) = (t[k], t[(k + 1) % 3]);
         (b[0] - a[0]).hypot(b[1] - a[1])
@@ -40,7 +40,7 @@ pub(crate) fn widened(mut t: [[f64; 2]; 3], share: f64) -> [[f64; 2]; 3] {
 }
 
 /// A triangle in space unfolded into the plane: first edge along x.
-pub(crate) fn unfold(p: [Vector3<f64>; 3]) -> [[f64; 2]; 3] {
+pub fn unfold(p: [Vector3<f64>; 3]) -> [[f64; 2]; 3] {
     let (a, b) = (p[1] - p[0], p[2] - p[0]);
     let x = a.norm().max(f64::MIN_POSITIVE);
     [[0.0; 2], [x, 0.0], [a.dot(&b) / x, a.cross(&b).norm() / x]]

@@ -1,8 +1,8 @@
 //! Fabric in SI units.
 
 use super::GarmentError;
-use crate::formats::fabric_json::MeasuredFabric;
 use serde::{Deserialize, Serialize};
+use tryon_formats::fabric_json::MeasuredFabric;
 
 /// A thin sheet. Stretch and shear are forces per metre of width (membrane stiffness: Young's modulus × thickness).
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

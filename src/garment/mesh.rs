@@ -3,9 +3,9 @@
 use super::triangulate::{PanelMesh, triangulate};
 use super::union_find::UnionFind;
 use super::{Anchor, GarmentError, GarmentKind, Material, Panel, Pattern, Placement, Side, Size};
-use crate::math::P3;
-use crate::mesh::{Face, Topology, TriMesh};
 use serde::{Deserialize, Serialize};
+use tryon_geometry::math::P3;
+use tryon_geometry::mesh::{Face, Topology, TriMesh};
 
 /// Gap between panels in texture space, metres.
 const TEXTURE_GAP: f64 = 0.02;

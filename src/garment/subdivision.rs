@@ -3,9 +3,9 @@
 //! The pieces lie in the triangle that they come from, so a surface without intersections keeps none.
 
 use super::{GarmentMesh, Region, RenderMesh};
-use crate::math::V3d;
-use crate::mesh::Face;
 use std::collections::HashMap;
+use tryon_geometry::math::V3d;
+use tryon_geometry::mesh::Face;
 
 /// A garment on the finer of two meshes.
 #[derive(Clone, Debug, PartialEq)]
@@ -132,7 +132,7 @@ fn subdivide_drawn(coarse: &RenderMesh, middles: &mut Middles) -> RenderMesh {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::garment::{Size, Triangulation, library};
+    use crate::{Size, Triangulation, library};
 
     fn area(t: &[[f64; 2]; 3]) -> f64 {
         let [e, d] = [1, 2].map(|k| [t[k][0] - t[0][0], t[k][1] - t[0][1]]);

@@ -2,9 +2,9 @@
 
 use super::flat_triangle::{rest_area, smallest_angle};
 use super::{GarmentError, Panel};
-use crate::mesh::Csr;
-use crate::mesh::smoothing::mean;
 use spade::{ConstrainedDelaunayTriangulation, Point2, Triangulation as _};
+use tryon_geometry::mesh::Csr;
+use tryon_geometry::mesh::smoothing::mean;
 
 /// Triangles of one panel. Boundary vertices come first, in the order of the outline.
 pub(super) struct PanelMesh {

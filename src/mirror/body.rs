@@ -1,8 +1,8 @@
 //! Posed surface of one body, with its rest shape kept until the shape changes.
 
-use crate::body::{BodyShape, BoneTransforms, Pose, RestBody, Template};
-use crate::math::P3;
 use std::sync::Arc;
+use tryon_body::{BodyShape, BoneTransforms, Pose, RestBody, Template};
+use tryon_geometry::math::P3;
 
 /// Skinned surface of a tracked body and the buffers to pose it again.
 #[derive(Debug, Default)]
@@ -50,8 +50,8 @@ impl PosedBody {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::body::embedded;
-    use crate::math::{Body, Rigid, World};
+    use tryon_body::embedded;
+    use tryon_geometry::math::{Body, Rigid, World};
 
     #[test]
     fn rest_pose_skins_to_the_rest_shape_of_each_shape() {

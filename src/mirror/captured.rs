@@ -1,20 +1,20 @@
 //! Captured garments as garments to wear: each part of a capture on the undressed body of its own subject.
 
-use crate::body::Template;
-use crate::clothcap::archive::{CaptureArchive, CaptureHeader, FrameDisplacements};
-use crate::clothcap::multi::ClothPart;
-use crate::clothcap::retarget::on_body;
-use crate::clothcap::segment::Slot;
-use crate::clothcap::texture::{GarmentTexture, Texel, TextureAtlas};
-use crate::clothcap::topology::ClothTemplate;
-use crate::dressing::{MeshGarment, MeshGarmentError, SourceBody};
-use crate::formats::FormatError;
-use crate::garment::{FabricImage, Material, RenderMesh};
-use crate::math::{P3, V3};
-use crate::spatial::{Bvh, SurfacePoint};
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::Arc;
+use tryon_body::Template;
+use tryon_clothcap::archive::{CaptureArchive, CaptureHeader, FrameDisplacements};
+use tryon_clothcap::multi::ClothPart;
+use tryon_clothcap::retarget::on_body;
+use tryon_clothcap::segment::Slot;
+use tryon_clothcap::texture::{GarmentTexture, Texel, TextureAtlas};
+use tryon_clothcap::topology::ClothTemplate;
+use tryon_dressing::{MeshGarment, MeshGarmentError, SourceBody};
+use tryon_formats::FormatError;
+use tryon_garment::{FabricImage, Material, RenderMesh};
+use tryon_geometry::math::{P3, V3};
+use tryon_geometry::spatial::{Bvh, SurfacePoint};
 
 /// Garments of one capture, on its subject's body under them in the rest pose (eq. 22 to 25).
 #[derive(Debug)]

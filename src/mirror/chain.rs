@@ -8,21 +8,20 @@ use super::offline_outfit::OfflineOutfit;
 use super::outfit::{DressedOutfit, PutOn, Subject};
 use super::painter::{CapturedView, DrawnOutfit, OutfitPainter};
 use super::report::{MirrorFrame, StageTimer};
-use crate::body::measure::measure;
-use crate::body::{BodyShape, Pose, Template};
-use crate::camera::{Calibration, ColorImage, RgbdFrame};
-use crate::cloth;
-use crate::composite::{Appearance, ImagePyramid, Print, RenderReport};
-use crate::math::P3;
-use crate::tracking::{self, Status, TrackerConfig, TrackerModel, TrackerState};
 use std::sync::Arc;
+use tryon_body::measure::measure;
+use tryon_body::{BodyShape, Pose, Template};
+use tryon_geometry::camera::{Calibration, ColorImage, RgbdFrame};
+use tryon_geometry::math::P3;
+use tryon_tracking::{Status, TrackerConfig, TrackerModel, TrackerState};
+use tryon_view::{Appearance, ImagePyramid, Print, RenderReport};
 
 /// One person, one camera, one outfit: frames in, pictures out.
 pub struct Mirror {
     choices: Vec<Choice>,
     tracker: TrackerModel,
     tracked: TrackerState,
-    tracking_work: tracking::Workspace,
+    tracking_work: tryon_tracking::Workspace,
     clock: FrameClock,
     worn: Option<Worn>,
     shape: Arc<BodyShape>,
@@ -51,7 +50,7 @@ impl Mirror {
             choices,
             tracked: TrackerState::new(&tracker),
             tracker,
-            tracking_work: tracking::Workspace::default(),
+            tracking_work: tryon_tracking::Workspace::default(),
             clock: FrameClock::default(),
             worn: None,
             shape: Arc::default(),
@@ -70,7 +69,7 @@ impl Mirror {
     pub fn step(&mut self, frame: &RgbdFrame) -> Result<MirrorFrame, MirrorError> {
         let mut timer = StageTimer::start();
         let work = &mut self.tracking_work;
-        let tracking = tracking::step(&self.tracker, &mut self.tracked, frame, work)?;
+        let tracking = tryon_tracking::step(&self.tracker, &mut self.tracked, frame, work)?;
         timer.lap("tracking");
 
         let dt = LongGap::Nominal.time_step(self.clock.gap(frame.time_ns));
@@ -104,7 +103,7 @@ impl Mirror {
     }
 
     /// Sets the time between two measurements of garments off the person, seconds; 0 measures in every picture. See
-    /// [`composite::Config::off_person_interval`](crate::composite::Config::off_person_interval).
+    /// [`composite::Config::off_person_interval`](tryon_view::Config::off_person_interval).
     pub fn set_off_person_interval(&mut self, seconds: f64) {
         self.painter.set_off_person_interval(seconds);
     }
@@ -240,7 +239,7 @@ impl Mirror {
         &mut self,
         body_camera: &[P3],
         dt: f64,
-    ) -> Result<Option<cloth::StepReport>, MirrorError> {
+    ) -> Result<Option<tryon_cloth::StepReport>, MirrorError> {
         let Some(worn) = &mut self.worn else {
             return Ok(None);
         };

@@ -1,9 +1,9 @@
 //! Garments chosen for a person and the size in which each is worn.
 
-use crate::body::measure::Measurements;
-use crate::dressing::{FinishedGarment, GarmentSource, MeshGarment, suggest};
-use crate::garment::{FabricImage, GarmentError, Pattern, Size, library};
 use std::sync::Arc;
+use tryon_body::measure::Measurements;
+use tryon_dressing::{FinishedGarment, GarmentSource, MeshGarment, suggest};
+use tryon_garment::{FabricImage, GarmentError, Pattern, Size, library};
 
 /// One garment chosen for a person.
 #[derive(Clone, Debug)]
@@ -164,8 +164,8 @@ impl SizedGarment {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::body::measure::measure;
-    use crate::body::{BodyShape, embedded};
+    use tryon_body::measure::measure;
+    use tryon_body::{BodyShape, embedded};
 
     #[test]
     fn an_open_size_is_the_suggested_one_and_a_given_size_is_kept() {

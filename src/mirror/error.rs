@@ -1,19 +1,18 @@
 //! Failures of the chain, by the stage at fault.
 
-use crate::body::measure::MeasureError;
-use crate::cloth::ClothError;
-use crate::composite::RenderError;
-use crate::dressing::DressError;
-use crate::garment::GarmentError;
-use crate::offline::OfflineError;
-use crate::tracking;
+use tryon_body::measure::MeasureError;
+use tryon_cloth::ClothError;
+use tryon_cloth::fine::OfflineError;
+use tryon_dressing::DressError;
+use tryon_garment::GarmentError;
+use tryon_view::RenderError;
 
 /// Frame or garment that stops the chain.
 #[derive(Debug, thiserror::Error)]
 pub enum MirrorError {
     /// The frame does not fit the camera.
     #[error(transparent)]
-    Track(#[from] tracking::StepError),
+    Track(#[from] tryon_tracking::StepError),
     /// The tracked body cannot be measured.
     #[error(transparent)]
     Measure(#[from] MeasureError),

@@ -4,11 +4,11 @@
 use super::error::MirrorError;
 use super::offline_outfit::OfflineOutfit;
 use super::outfit::DressedOutfit;
-use crate::offline::{DrapeReport, DrapeSettings, FrameTargets, OfflineState, StartReport};
-use crate::par::Par;
 use serde::{Deserialize, Serialize};
 use std::ops::ControlFlow;
 use std::time::Instant;
+use tryon_cloth::fine::{DrapeReport, DrapeSettings, FrameTargets, OfflineState, StartReport};
+use tryon_geometry::par::Par;
 
 /// Work of a drape on one mesh.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]

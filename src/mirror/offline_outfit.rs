@@ -2,18 +2,18 @@
 
 use super::error::MirrorError;
 use super::outfit::DressedOutfit;
-use crate::cloth::AnchorBinding;
-use crate::contact::broad_phase::EdgeFace;
-use crate::contact::{ContactMesh, ContactSurface};
-use crate::garment::{GarmentMesh, GarmentSubdivision};
-use crate::math::{P3, V3d};
-use crate::mesh::Face;
-use crate::offline::{
+use std::collections::BTreeMap;
+use tryon_cloth::AnchorBinding;
+use tryon_cloth::contact::broad_phase::EdgeFace;
+use tryon_cloth::contact::{ContactMesh, ContactSurface};
+use tryon_cloth::fine::{
     JoinedSurfaces, MotionState, OfflineCloth, OfflineError, OfflineSettings, OfflineSolver,
     OfflineState, PinTarget, StartReport, checkpoint_state,
 };
-use crate::par::Par;
-use std::collections::BTreeMap;
+use tryon_garment::{GarmentMesh, GarmentSubdivision};
+use tryon_geometry::math::{P3, V3d};
+use tryon_geometry::mesh::Face;
+use tryon_geometry::par::Par;
 
 /// Anchor strength from which a vertex is tied to the skin; weaker anchors are left to friction.
 const TIED: f64 = 1.0;

@@ -3,14 +3,14 @@
 use super::choice::SizedGarment;
 use super::clock::NOMINAL;
 use super::wear::{SETTLING, WearWatch};
-use crate::body::parts::vertex_masks;
-use crate::body::{BoneTransforms, Pose, RestBody, Template};
-use crate::cloth::ClothError;
-use crate::cloth::{Config, Input, Model, State, StepReport, Workspace, step};
-use crate::dressing::{DressError, DressOptions, GarmentSource, dress_all};
-use crate::math::{Camera, P3, Rigid, World};
-use crate::tracking::ArmClearance;
 use std::sync::Arc;
+use tryon_body::parts::vertex_masks;
+use tryon_body::{BoneTransforms, Pose, RestBody, Template};
+use tryon_cloth::ClothError;
+use tryon_cloth::{Config, Input, Model, State, StepReport, Workspace, step};
+use tryon_dressing::{DressError, DressOptions, GarmentSource, dress_all};
+use tryon_geometry::math::{Camera, P3, Rigid, World};
+use tryon_tracking::ArmClearance;
 
 /// Tracked body that is dressed.
 #[derive(Clone, Copy, Debug)]

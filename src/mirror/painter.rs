@@ -1,12 +1,12 @@
 //! Compositing of garments over the captured frames of one camera.
 
 use super::picture::{CameraGarments, DrawnBody, DrawnSurface};
-use crate::body::Template;
-use crate::camera::{Calibration, ColorImage, RgbdFrame};
-use crate::composite::{self, Appearance, RenderError, RenderReport};
-use crate::garment::GarmentMesh;
-use crate::math::{Camera, P3, Rigid, World};
 use std::sync::Arc;
+use tryon_body::Template;
+use tryon_garment::GarmentMesh;
+use tryon_geometry::camera::{Calibration, ColorImage, RgbdFrame};
+use tryon_geometry::math::{Camera, P3, Rigid, World};
+use tryon_view::{Appearance, RenderError, RenderReport};
 
 /// Garments to draw and the body under them.
 #[derive(Clone, Copy, Debug)]
@@ -34,9 +34,9 @@ pub(super) struct CapturedView<'a> {
 pub struct OutfitPainter {
     body: DrawnBody,
     garments: CameraGarments,
-    compositor: composite::Model,
-    state: composite::State,
-    work: composite::Workspace,
+    compositor: tryon_view::Model,
+    state: tryon_view::State,
+    work: tryon_view::Workspace,
 }
 
 impl OutfitPainter {
@@ -45,13 +45,13 @@ impl OutfitPainter {
         Self {
             body: DrawnBody::new(template),
             garments: CameraGarments::default(),
-            compositor: composite::Model::default(),
-            state: composite::State::default(),
-            work: composite::Workspace::default(),
+            compositor: tryon_view::Model::default(),
+            state: tryon_view::State::default(),
+            work: tryon_view::Workspace::default(),
         }
     }
 
-    /// Sets [`composite::Config::off_person_interval`], seconds.
+    /// Sets [`tryon_view::Config::off_person_interval`], seconds.
     pub fn set_off_person_interval(&mut self, seconds: f64) {
         self.compositor.config.off_person_interval = seconds;
     }
@@ -83,13 +83,13 @@ impl OutfitPainter {
             camera_from_world.points_f32(outfit.body, &mut met);
         }
         let drawn = outfit.map(|_| &met[..]).or(posed);
-        let input = composite::Input {
+        let input = tryon_view::Input {
             frame: view.frame,
             calibration: view.calibration,
             garments: &self.garments.views(surfaces),
             body: drawn.map(|vertices| self.body.view(vertices)),
             output: None,
         };
-        composite::render(&self.compositor, &mut self.state, &input, &mut self.work)
+        tryon_view::render(&self.compositor, &mut self.state, &input, &mut self.work)
     }
 }

@@ -1,13 +1,13 @@
 //! Input of the compositor: garments and body in the camera frame.
 
-use crate::body::Template;
-use crate::cloth::{Config, collision_model};
-use crate::composite::{Appearance, BodyView, GarmentView, Limbs, Print};
-use crate::contact::{CollisionBody, CollisionModel, CollisionWorkspace};
-use crate::garment::library;
-use crate::math::{Camera, P3, Rigid, V3, World};
-use crate::mesh::{Face, face_normal};
 use std::sync::Arc;
+use tryon_body::Template;
+use tryon_cloth::contact::{CollisionBody, CollisionModel, CollisionWorkspace};
+use tryon_cloth::{Config, collision_model};
+use tryon_garment::library;
+use tryon_geometry::math::{Camera, P3, Rigid, V3, World};
+use tryon_geometry::mesh::{Face, face_normal};
+use tryon_view::{Appearance, BodyView, GarmentView, Limbs, Print};
 
 /// Appearance of a garment of the library; of other names that of its first garment.
 pub fn library_appearance(garment: &str) -> Appearance {

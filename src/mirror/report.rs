@@ -1,10 +1,8 @@
 //! Result of one frame and the time of its stages.
 
-use crate::camera::ColorImage;
-use crate::cloth;
-use crate::composite::RenderReport;
-use crate::tracking;
 use std::time::Instant;
+use tryon_geometry::camera::ColorImage;
+use tryon_view::RenderReport;
 
 /// Result of one frame.
 #[derive(Debug)]
@@ -18,9 +16,9 @@ pub struct MirrorFrame {
     /// Milliseconds by stage: `tracking`, `dressing`, `cloth`, `composite`, those that ran.
     pub stages_ms: Vec<(&'static str, f64)>,
     /// Report of the tracker.
-    pub tracking: tracking::StepReport,
+    pub tracking: tryon_tracking::StepReport,
     /// Report of the cloth; `None` without a dressed body.
-    pub cloth: Option<cloth::StepReport>,
+    pub cloth: Option<tryon_cloth::StepReport>,
     /// Report of the compositor.
     pub render: RenderReport,
 }

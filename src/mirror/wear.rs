@@ -1,8 +1,8 @@
 //! Fit of a worn outfit from step to step, and its return to how it was put on.
 
-use crate::body::parts::BodyPart;
-use crate::cloth::{ClothError, Model, State, StepReport, WornReference};
-use crate::math::P3;
+use tryon_body::parts::BodyPart;
+use tryon_cloth::{ClothError, Model, State, StepReport, WornReference};
+use tryon_geometry::math::P3;
 
 /// Stretch that one edge in a hundred exceeds in a garment that is caught or torn: dances reach 0.25 for a frame.
 const MOST_STRAIN: f64 = 0.25;

@@ -2,9 +2,9 @@
 
 use super::routine::{Routine, ease};
 use super::stance::{Limb, Rig, Stance};
-use crate::formats::MotionClip;
-use crate::math::{P3d, V3d, log_so3};
 use nalgebra::{Matrix3, Rotation3, UnitQuaternion};
+use tryon_formats::MotionClip;
+use tryon_geometry::math::{P3d, V3d, log_so3};
 
 /// The joints of a clip that a stance needs, `[left, right]` where there are two.
 #[derive(Clone, Debug)]
@@ -220,8 +220,8 @@ impl Performance {
 
 #[cfg(test)]
 mod tests {
-    use crate::formats::{MotionClip, read_motion, shared_data};
-    use crate::synth::{Actor, Sequence, Setting};
+    use crate::{Actor, Sequence, Setting};
+    use tryon_formats::{MotionClip, read_motion, shared_data};
 
     fn shared(name: &str) -> Option<MotionClip> {
         let root = shared_data("motion")?;

@@ -1,14 +1,14 @@
 //! Furniture of a shop: chairs, tables, shelves, racks with garments, mannequins, curtains, bags, as triangle meshes.
 
-use crate::body::embedded;
-use crate::body::parts::BodySegment;
-use crate::body::{BodyShape, Template};
-use crate::camera::Intrinsics;
-use crate::math::{Camera, P3, Rigid, World};
-use crate::mesh::Face;
-use crate::par::Par;
-use crate::raster::{Cull, Options, View, VisibilityBuffer, rasterise_with};
 use std::f32::consts::{PI, TAU};
+use tryon_body::embedded;
+use tryon_body::parts::BodySegment;
+use tryon_body::{BodyShape, Template};
+use tryon_geometry::camera::Intrinsics;
+use tryon_geometry::math::{Camera, P3, Rigid, World};
+use tryon_geometry::mesh::Face;
+use tryon_geometry::par::Par;
+use tryon_geometry::raster::{Cull, Options, View, VisibilityBuffer, rasterise_with};
 
 /// Kind of a piece.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -1,8 +1,8 @@
 //! Appearance of the synthetic actor: colours by region of the rest body.
 
-use crate::body::parts::{BodyParts, BodySegment};
-use crate::body::{RestBody, Skeleton, SkinWeights};
-use crate::math::{P3, V3};
+use tryon_body::parts::{BodyParts, BodySegment};
+use tryon_body::{RestBody, Skeleton, SkinWeights};
+use tryon_geometry::math::{P3, V3};
 
 /// Colours of an actor, sRGB.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

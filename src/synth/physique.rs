@@ -1,13 +1,13 @@
 //! Physiques far outside the embedded body's shape space: morphs of a base body, bends, bellies and worn coverings.
 
-use crate::body::import::template_from_smpl;
-use crate::body::parts::{BodyPart, BodySegment};
-use crate::body::{BodyError, BoneTransforms, Pose, RestBody, Template, skin};
-use crate::formats::npz::{SmplArrays, regress};
-use crate::math::{Body, P3, Rigid, V3};
-use crate::mesh::smoothing::smoothed;
-use crate::mesh::vertex_normals;
-use crate::par::Par;
+use tryon_body::import::template_from_smpl;
+use tryon_body::parts::{BodyPart, BodySegment};
+use tryon_body::{BodyError, BoneTransforms, Pose, RestBody, Template, skin};
+use tryon_formats::npz::{SmplArrays, regress};
+use tryon_geometry::math::{Body, P3, Rigid, V3};
+use tryon_geometry::mesh::smoothing::smoothed;
+use tryon_geometry::mesh::vertex_normals;
+use tryon_geometry::par::Par;
 
 /// A round belly: a bulge of the front of the trunk.
 #[derive(Clone, Copy, Debug, PartialEq)]

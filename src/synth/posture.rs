@@ -1,8 +1,8 @@
 //! Postures that people take without being asked: held still, in directions of bones.
 
 use super::stance::{Limb, Rig, Stance};
-use crate::math::{P3d, V3d};
 use nalgebra::UnitQuaternion;
+use tryon_geometry::math::{P3d, V3d};
 
 /// A posture that is held.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -187,8 +187,8 @@ fn kneel(rig: &Rig, home: P3d, stance: &mut Stance) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::camera::NoiseModel;
-    use crate::synth::{Actor, Routine, Sequence, Setting, Truth};
+    use crate::{Actor, Routine, Sequence, Setting, Truth};
+    use tryon_geometry::camera::NoiseModel;
 
     fn held(posture: Posture) -> (Sequence, Truth) {
         let setting = Setting {

@@ -1,7 +1,7 @@
 //! A room with a wooden floor and two walls, rendered once.
 
-use crate::camera::Intrinsics;
-use crate::math::{Camera, P3d, Rigid, V3d, World};
+use tryon_geometry::camera::Intrinsics;
+use tryon_geometry::math::{Camera, P3d, Rigid, V3d, World};
 
 /// Planes and colours of a room. World frame: floor at y = 0, the camera looks towards −z.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -2,8 +2,8 @@
 
 use super::posture::Posture;
 use super::stance::{Limb, Rig, Stance};
-use crate::math::{P3d, V3d, exp_so3};
 use nalgebra::UnitQuaternion;
+use tryon_geometry::math::{P3d, V3d, exp_so3};
 
 /// Motion in front of the camera.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

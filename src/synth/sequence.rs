@@ -7,15 +7,17 @@ use super::posture::Posture;
 use super::room::{Background, Room};
 use super::routine::Routine;
 use super::stance::Rig;
-use crate::body::{BodyShape, BoneTransforms, Pose, RestBody, Template, skin};
-use crate::camera::{Calibration, ColorImage, DepthImage, Intrinsics, NoiseModel, RgbdFrame};
-use crate::formats::MotionClip;
-use crate::math::{Camera, P3, P3d, Rigid, V3, V3d, World};
-use crate::mesh::vertex_normals;
-use crate::par::Par;
-use crate::raster::{Cull, Options, View, VisibilityBuffer, barycentrics, rasterise_with};
 use nalgebra::UnitQuaternion;
 use std::sync::Arc;
+use tryon_body::{BodyShape, BoneTransforms, Pose, RestBody, Template, skin};
+use tryon_formats::MotionClip;
+use tryon_geometry::camera::{
+    Calibration, ColorImage, DepthImage, Intrinsics, NoiseModel, RgbdFrame,
+};
+use tryon_geometry::math::{Camera, P3, P3d, Rigid, V3, V3d, World};
+use tryon_geometry::mesh::vertex_normals;
+use tryon_geometry::par::Par;
+use tryon_geometry::raster::{Cull, Options, View, VisibilityBuffer, barycentrics, rasterise_with};
 
 /// Person in front of the camera.
 #[derive(Clone, Debug)]
@@ -32,7 +34,7 @@ impl Default for Actor {
     /// The embedded body as it is.
     fn default() -> Self {
         Self {
-            template: crate::body::embedded::template(),
+            template: tryon_body::embedded::template(),
             shape: BodyShape::default(),
             appearance: 0,
         }

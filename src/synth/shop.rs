@@ -3,9 +3,9 @@
 use super::furniture::{NEAR, Piece, hand};
 use super::room::Room;
 use super::sequence::Setting;
-use crate::camera::NoiseModel;
-use crate::math::{P3, P3d, V3d};
 use rand::{Rng, SeedableRng};
+use tryon_geometry::camera::NoiseModel;
+use tryon_geometry::math::{P3, P3d, V3d};
 
 /// People that stand before the camera at most.
 pub const PLACES: usize = 3;

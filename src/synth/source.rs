@@ -1,8 +1,8 @@
 //! A synthetic sequence as a source of frames.
 
 use super::Sequence;
-use crate::camera::{Calibration, RgbdFrame};
-use crate::formats::{FormatError, RgbdSource};
+use tryon_formats::{FormatError, RgbdSource};
+use tryon_geometry::camera::{Calibration, RgbdFrame};
 
 /// Frames of a [`Sequence`] in order.
 #[derive(Clone, Debug)]
@@ -51,7 +51,7 @@ impl RgbdSource for SynthSource {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::synth::{Actor, Routine, Setting};
+    use crate::{Actor, Routine, Setting};
 
     #[test]
     fn source_ends_after_its_frames_and_rewinds_to_the_same_bits() {

@@ -2,9 +2,9 @@
 //!
 //! Keyframes and motion clips give directions; [`Rig::pose`] finds the joint angles of a template for them.
 
-use crate::body::{JointMotion, Pose, RestBody, Skeleton};
-use crate::math::{P3d, Rigid, V3d, World, exp_so3, log_so3};
 use nalgebra::{Matrix3, Rotation3, Unit, UnitQuaternion};
+use tryon_body::{JointMotion, Pose, RestBody, Skeleton};
+use tryon_geometry::math::{P3d, Rigid, V3d, World, exp_so3, log_so3};
 
 /// Upper part, lower part and end of a limb as unit directions.
 pub(super) type Limb = [V3d; 3];

@@ -5,12 +5,12 @@
 
 use super::TrackerModel;
 use super::pose_fit::{FitContext, FitScratch};
-use crate::body::Pose;
 use crate::registration::{IndexImage, Observation};
-use crate::spatial::{Label, OrganisedCloud, chessboard_distances};
 use serde::{Deserialize, Serialize};
+use tryon_body::Pose;
+use tryon_geometry::spatial::{Label, OrganisedCloud, chessboard_distances};
 
-/// Number of [`BodyPart`](crate::body::parts::BodyPart)s.
+/// Number of [`BodyPart`](tryon_body::parts::BodyPart)s.
 pub(super) const PARTS: usize = 5;
 
 /// Width of a seam along outlines that counts for neither side, metres: loose clothes and a body of not quite the right
@@ -28,7 +28,7 @@ pub struct Agreement {
     pub in_free_space: f32,
     /// Readings of the subject without body: beside it or in front of it.
     pub uncovered: f32,
-    /// Share of the visible surface of each [`BodyPart`](crate::body::parts::BodyPart) in free space, 0 to 1; 0 for a part out of view.
+    /// Share of the visible surface of each [`BodyPart`](tryon_body::parts::BodyPart) in free space, 0 to 1; 0 for a part out of view.
     pub parts: [f32; PARTS],
     /// Share of the visible surface of each part that gives no return, 0 to 1.
     #[serde(default)]
@@ -149,8 +149,8 @@ fn seam(observation: &Observation<'_>) -> u16 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::body::parts::BodyPart;
-    use crate::tracking::test_scene::{DepthScan, TestScene};
+    use crate::test_scene::{DepthScan, TestScene};
+    use tryon_body::parts::BodyPart;
 
     /// Agreement of a body in one pose with readings of it in another.
     fn agreement(scene: &TestScene, body_pose: &Pose, seen: &Pose) -> Agreement {
@@ -195,7 +195,7 @@ mod tests {
         let scene = TestScene::new(300, 240);
         let mut away = scene.pose.clone();
         let behind = nalgebra::Translation3::new(0.0, 0.0, -9.0);
-        away.root = crate::math::Rigid::new(behind * away.root.iso());
+        away.root = tryon_geometry::math::Rigid::new(behind * away.root.iso());
         let alone = agreement(&scene, &away, &scene.pose);
         assert_eq!((alone.in_free_space, alone.uncovered), (0.0, 1.0));
         let nobody = agreement(&scene, &away, &away);

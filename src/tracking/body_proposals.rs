@@ -6,13 +6,13 @@ use super::joint_proposals::JointProposals;
 use super::part_classes::PartKind;
 use super::pose_fit::{FitContext, FitScratch, evaluate};
 use super::proposed_pose::ProposedPoses;
-use crate::body::parts::{BodyPart, BodySide};
-use crate::body::{BoneTransforms, Pose};
-use crate::math::P3;
 use crate::registration::Observation;
 use crate::segment::part_forest::{PartScratch, PersonCells};
 use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
 use std::f64::consts::PI;
+use tryon_body::parts::{BodyPart, BodySide};
+use tryon_body::{BoneTransforms, Pose};
+use tryon_geometry::math::P3;
 
 /// Longest pair in comparisons of poses that are not fitted yet, metres.
 const REACH: f32 = 0.15;

@@ -5,10 +5,10 @@ use super::pose_fit::{
     ANNEAL, FitContext, FitReport, FitScratch, START, Schedule, TRACK, evaluate, fit_pose,
 };
 use super::{SizeEstimate, Status, TrackerModel, TrackerState};
-use crate::body::{BodyShape, Pose};
-use crate::math::{Camera, Rigid};
 use crate::registration::Observation;
 use nalgebra::{Translation3, Vector3};
+use tryon_body::{BodyShape, Pose};
+use tryon_geometry::math::{Camera, Rigid};
 
 /// Most rounds of pose and size in the first frame.
 const ROUNDS: usize = 8;

@@ -1,9 +1,9 @@
 //! Change detection: reuses the last report while the depth image differs from a reference only by sensor noise.
 
 use super::{StepReport, TrackingStagesMs};
-use crate::camera::DepthImage;
-use crate::spatial::OrganisedCloud;
 use serde::{Deserialize, Serialize};
+use tryon_geometry::camera::DepthImage;
+use tryon_geometry::spatial::OrganisedCloud;
 
 /// Samples along a side of a block.
 const BLOCK: usize = 8;
@@ -165,7 +165,7 @@ fn samples(image: &DepthImage, step: u32, columns: u32, block: u32, mut f: impl 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::tracking::{Skipped, Status};
+    use crate::{Skipped, Status};
     use rand::{Rng, SeedableRng};
 
     const WIDTH: u32 = 160;
@@ -261,10 +261,10 @@ mod tests {
             .filter(|_| reference.reuse(&first).is_some())
             .count();
         assert_eq!(kept as u32, MOST_REUSED);
-        let camera = crate::camera::Intrinsics {
+        let camera = tryon_geometry::camera::Intrinsics {
             width: WIDTH,
             height: HEIGHT,
-            ..crate::camera::Intrinsics::KINECT_V1
+            ..tryon_geometry::camera::Intrinsics::KINECT_V1
         };
         let grid = OrganisedCloud::new(&camera, Some(2));
         let cell = 30 * (WIDTH / 2) + 36;

@@ -2,9 +2,9 @@
 
 use super::agreement::Agreement;
 use super::pose_fit::{FitContext, FitScratch};
-use crate::body::{JointMotion, Pose};
-use crate::spatial::Label;
 use serde::{Deserialize, Serialize};
+use tryon_body::{JointMotion, Pose};
+use tryon_geometry::spatial::Label;
 
 /// Reason that limits a joint's confidence.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -133,9 +133,9 @@ fn samples_without_return(context: &FitContext<'_>, scratch: &FitScratch) -> Vec
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::tracking::agreement::AgreementScratch;
-    use crate::tracking::pose_fit::{TRACK, fit_pose};
-    use crate::tracking::test_scene::{DepthScan, TestScene};
+    use crate::agreement::AgreementScratch;
+    use crate::pose_fit::{TRACK, fit_pose};
+    use crate::test_scene::{DepthScan, TestScene};
 
     #[test]
     fn a_limb_in_the_air_says_so_and_the_others_do_not() {

@@ -1,7 +1,7 @@
 //! Extrapolation of a motion, and its size.
 
-use crate::body::{JointMotion, Pose, Skeleton};
-use crate::math::{Rigid, exp_so3, log_so3};
+use tryon_body::{JointMotion, Pose, Skeleton};
+use tryon_geometry::math::{Rigid, exp_so3, log_so3};
 
 /// Extrapolates the motion from `before` to `last` by `ratio` of its duration.
 pub(super) fn extrapolate(skeleton: &Skeleton, before: &Pose, last: &Pose, ratio: f64) -> Pose {
@@ -59,8 +59,8 @@ pub(super) fn motion(skeleton: &Skeleton, from: &Pose, to: &Pose) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::tracking::kinematics::apply;
-    use crate::tracking::kinematics::tests::arm;
+    use crate::kinematics::apply;
+    use crate::kinematics::tests::arm;
     use nalgebra::{DVector, Vector3};
 
     #[test]

@@ -1,10 +1,10 @@
 //! Facing of the person: yaw about gravity from the votes of the part forest.
 
 use super::part_classes::{PartClasses, PartKind};
-use crate::body::parts::BodySide;
-use crate::math::{P3d, V3, V3d};
 use crate::segment::part_forest::{PersonCells, YAW_BINS, YawBelief};
 use std::f32::consts::{FRAC_PI_4, TAU};
+use tryon_body::parts::BodySide;
+use tryon_geometry::math::{P3d, V3, V3d};
 
 /// Least length of the level part of a unit direction from which it gives a yaw.
 const LEVEL: f64 = 0.05;

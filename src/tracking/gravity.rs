@@ -6,10 +6,10 @@
 use super::TrackerModel;
 use super::body_proposals::person_cells;
 use super::state::ASSUMED_HEIGHT;
-use crate::math::{Camera, Rigid, World};
 use crate::registration::Observation;
 use crate::segment::part_forest::PartScratch;
 use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
+use tryon_geometry::math::{Camera, Rigid, World};
 
 /// Directions against gravity, camera frame: upright, on either side, upside down.
 const UPS: [[f64; 3]; 4] = [
@@ -55,8 +55,8 @@ fn level_camera(up: &Vector3<f64>, height: f64) -> Rigid<World, Camera> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::camera::DepthImage;
-    use crate::tracking::test_scene::{DepthScan, TestScene};
+    use crate::test_scene::{DepthScan, TestScene};
+    use tryon_geometry::camera::DepthImage;
 
     /// Upward direction found for the image.
     fn up_in(scene: &TestScene, image: &DepthImage) -> Vector3<f64> {

@@ -2,9 +2,9 @@
 
 use super::limb::Limb;
 use super::model::TrackerModel;
-use crate::body::{BoneTransforms, Pose, RestBody};
-use crate::math::{P3, P3d};
-use crate::spatial::{Label, OrganisedCloud};
+use tryon_body::{BoneTransforms, Pose, RestBody};
+use tryon_geometry::math::{P3, P3d};
+use tryon_geometry::spatial::{Label, OrganisedCloud};
 
 /// Distance up to which a hand is left to the hand residual, metres; a farther one gets an arm pose by inverse kinematics.
 const FOLLOWED: f64 = 0.15;
@@ -86,7 +86,7 @@ pub(super) fn assign_hands(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::tracking::test_scene::TestScene;
+    use crate::test_scene::TestScene;
     use nalgebra::Vector3;
 
     #[test]

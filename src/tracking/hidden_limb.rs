@@ -6,10 +6,10 @@
 use super::agreement::APART;
 use super::limb::Limb;
 use super::pose_fit::FitContext;
-use crate::body::{BoneTransforms, Pose};
-use crate::math::P3;
-use crate::spatial::Label;
 use nalgebra::{Point3, SMatrix, SVector, Vector3};
+use tryon_body::{BoneTransforms, Pose};
+use tryon_geometry::math::P3;
+use tryon_geometry::spatial::Label;
 
 /// Gauss–Newton iterations: with the bound of a step they turn a limb by half a turn.
 const ITERATIONS: usize = 6;
@@ -143,7 +143,7 @@ impl HiddenLimb<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::tracking::test_scene::{DepthScan, TestScene};
+    use crate::test_scene::{DepthScan, TestScene};
 
     /// Points of the left arm in free space before and after, of a body with its arm raised by `raised` radians over
     /// readings of one with its arm turned behind the trunk.

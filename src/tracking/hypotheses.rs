@@ -2,11 +2,11 @@
 
 use super::limb::Limb;
 use super::pose_fit::{FitContext, FitScratch, evaluate};
-use crate::body::parts::BodyPart;
-use crate::body::{BoneTransforms, JointMotion, Pose};
-use crate::math::{P3, P3d, exp_so3, log_so3};
 use crate::segment::{Extremity, extremities};
 use nalgebra::{UnitQuaternion, Vector3};
+use tryon_body::parts::BodyPart;
+use tryon_body::{BoneTransforms, JointMotion, Pose};
+use tryon_geometry::math::{P3, P3d, exp_so3, log_so3};
 
 /// Directions of the upper arm (x outward, y up, z forward).
 const UPPER_ARMS: [[f64; 3]; 9] = [

@@ -7,12 +7,12 @@ use super::pose_fit::{
     FitContext, FitReport, FitScratch, HYPOTHESIS_TERMS, START, Schedule, evaluate, fit_pose,
 };
 use super::size::ADULTS;
-use crate::body::Pose;
-use crate::math::{P3, Rigid, principal_axes};
 use crate::registration::Observation;
-use crate::spatial::chessboard_distances;
 use nalgebra::{UnitQuaternion, Vector3};
 use std::f64::consts::PI;
+use tryon_body::Pose;
+use tryon_geometry::math::{P3, Rigid, principal_axes};
+use tryon_geometry::spatial::chessboard_distances;
 
 /// Landmarks of the subject's silhouette.
 #[derive(Clone, Copy, Debug)]
@@ -248,7 +248,7 @@ fn trunk_root(
     outline: &Outline,
     lean: &Vector3<f64>,
     rotation: UnitQuaternion<f64>,
-) -> Rigid<crate::math::Camera, crate::math::Body> {
+) -> Rigid<tryon_geometry::math::Camera, tryon_geometry::math::Body> {
     let (crown, chest) = (context.model.crown, context.model.chest);
     let at = |j: usize| context.body.rest.joints[j].coords;
     let front = outline.torso.coords.cast::<f64>();

@@ -1,9 +1,9 @@
 //! Proposed places of a template's joints, from the part forest.
 
 use super::part_classes::{NECK_CLASS, PartClasses, PartKind};
-use crate::body::parts::BodySide;
-use crate::math::P3;
 use crate::segment::part_forest::JointProposal;
+use tryon_body::parts::BodySide;
+use tryon_geometry::math::P3;
 
 /// Largest distance between the halves of one head, metres.
 const HEAD: f32 = 0.20;

@@ -1,9 +1,9 @@
 //! Kinematics of the pose unknowns: unit twists of every degree of freedom (eq. 31) and the update.
 
-use crate::body::{BoneTransforms, JointMotion, Pose, Skeleton};
-use crate::math::{Rigid, Twist, exp_se3, exp_so3, log_so3};
 use crate::registration::Dof;
 use nalgebra::{DVector, Vector3};
+use tryon_body::{BoneTransforms, JointMotion, Pose, Skeleton};
+use tryon_geometry::math::{Rigid, Twist, exp_se3, exp_so3, log_so3};
 
 /// Fills `out` with the unit twists (eq. 31) about `centre`, the origin of their frame. An angle of a ball turns about an
 /// axis of its parent bone, so that the update is a rotation on the left.
@@ -81,11 +81,11 @@ pub fn apply<F>(skeleton: &Skeleton, pose: &mut Pose<F>, centre: &Vector3<f64>, 
 #[cfg(test)]
 pub(super) mod tests {
     use super::*;
-    use crate::body::{Joint, RestBody};
     use nalgebra::{Point3, UnitQuaternion};
+    use tryon_body::{Joint, RestBody};
 
     /// A trunk with one arm, posed.
-    pub(in crate::tracking) fn arm() -> (Skeleton, RestBody, Pose) {
+    pub(crate) fn arm() -> (Skeleton, RestBody, Pose) {
         let ball = JointMotion::Ball {
             limits: [[-3.0, 3.0]; 3],
         };

@@ -9,7 +9,7 @@ use super::probation::Probation;
 use super::size::{MOST_DEVIATIONS, SCALES};
 use super::subject::{StepLog, SubjectFrame};
 use super::{LostReason, SizeEstimate, TrackerModel, TrackerState, Workspace};
-use crate::body::{BodyShape, Template};
+use tryon_body::{BodyShape, Template};
 
 /// Size, shape and fit of a subject that was measured before.
 #[derive(Clone, Debug, PartialEq)]
@@ -175,10 +175,10 @@ impl SubjectFrame<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::camera::RgbdFrame;
-    use crate::tracking::probation::PROBATION;
-    use crate::tracking::test_scene::TestScene;
-    use crate::tracking::{Status, follow};
+    use crate::probation::PROBATION;
+    use crate::test_scene::TestScene;
+    use crate::{Status, follow};
+    use tryon_geometry::camera::RgbdFrame;
 
     /// A session before somebody at rest.
     struct Session {

@@ -1,8 +1,8 @@
 //! Legs of a template for the floor residual: hip, knee hinge, sole joints with their standing heights.
 
-use crate::body::parts::{BodySegment, BodySide};
-use crate::body::{JointMotion, Template};
 use crate::registration::residual::FootChain;
+use tryon_body::parts::{BodySegment, BodySide};
+use tryon_body::{JointMotion, Template};
 
 /// One leg of the template.
 #[derive(Clone, Debug)]

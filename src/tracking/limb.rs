@@ -1,11 +1,11 @@
 //! Arms and legs as chains of a ball, a hinge and an end; two-bone inverse kinematics by the law of cosines.
 
-use crate::body::parts::{BodyPart, LimbJoints};
-use crate::body::{BoneTransforms, JointMotion, Pose, RestBody, Skeleton, Template};
-use crate::math::{P3d, exp_so3, log_so3};
 use crate::registration::residual::EllipticColumn;
-use crate::spatial::{Label, OrganisedCloud};
 use nalgebra::{UnitQuaternion, Vector3};
+use tryon_body::parts::{BodyPart, LimbJoints};
+use tryon_body::{BoneTransforms, JointMotion, Pose, RestBody, Skeleton, Template};
+use tryon_geometry::math::{P3d, exp_so3, log_so3};
+use tryon_geometry::spatial::{Label, OrganisedCloud};
 
 /// One arm or leg of the template.
 #[derive(Clone, Debug)]
@@ -159,7 +159,7 @@ impl Limb {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::tracking::test_scene::TestScene;
+    use crate::test_scene::TestScene;
 
     #[test]
     fn a_limb_reaches_its_target_with_its_hinge_on_the_given_side() {

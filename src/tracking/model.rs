@@ -5,16 +5,16 @@ use super::leg::{Leg, legs};
 use super::limb::{self, Limb};
 use super::part_classes::PartClasses;
 use super::trunk::Trunk;
-use crate::body::parts::{BodyPart, BodySegment, BodySide};
-use crate::body::{JointMotion, SkinWeights, Template};
-use crate::camera::Calibration;
-use crate::math::{P3, V3};
 use crate::registration::Association;
 use crate::segment::part_forest::PartForest;
-use crate::spatial::{OrganisedCloud, PointTree};
 use nalgebra::{Point3, Vector3};
 use std::collections::BTreeMap;
 use std::sync::Arc;
+use tryon_body::parts::{BodyPart, BodySegment, BodySide};
+use tryon_body::{JointMotion, SkinWeights, Template};
+use tryon_geometry::camera::Calibration;
+use tryon_geometry::math::{P3, V3};
+use tryon_geometry::spatial::{OrganisedCloud, PointTree};
 
 /// Linear change of the rest body: one shape coefficient or the scale of one bone.
 #[derive(Clone, Debug)]
@@ -57,7 +57,7 @@ pub struct TrackerModel {
     pub(super) trunk: Option<Trunk>,
     /// Legs, left and right, for feet found at the start.
     pub(super) legs: [Option<Limb>; 2],
-    /// [`BodyPart`](crate::body::parts::BodyPart) of each joint, as a number, for the pose filter.
+    /// [`BodyPart`](tryon_body::parts::BodyPart) of each joint, as a number, for the pose filter.
     pub(super) parts: Vec<usize>,
     /// Joint at the height of the torso's middle; the root for a skeleton without.
     pub(super) chest: usize,

@@ -1,8 +1,8 @@
 //! Classes of the part forest: from the vertices of a template, and back to its joints.
 
-use crate::body::Template;
-use crate::body::parts::{BodyPart, BodySegment, BodySide};
-use crate::math::P3d;
+use tryon_body::Template;
+use tryon_body::parts::{BodyPart, BodySegment, BodySide};
+use tryon_geometry::math::P3d;
 
 /// Number of classes: thirteen pairs and the neck.
 pub const PART_CLASSES: usize = 27;
@@ -198,7 +198,7 @@ impl PartClasses {
             rest,
         };
         let vertices = template.mesh().vertices().iter().enumerate();
-        let class = |(v, p): (usize, &crate::math::P3)| {
+        let class = |(v, p): (usize, &tryon_geometry::math::P3)| {
             landmarks.class(template.weights().dominant(v), &p.cast::<f64>())
         };
         let of_vertex = vertices.map(class).collect();
@@ -264,7 +264,7 @@ fn anchor(template: &Template, class: u8) -> Option<[usize; 2]> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::body::embedded;
+    use tryon_body::embedded;
 
     #[test]
     fn classes_of_the_embedded_body_mirror_each_other() {

@@ -9,8 +9,8 @@ use super::agreement::PARTS;
 use super::part_classes::{PART_CLASSES, PartKind};
 use crate::registration::{IndexImage, Observation};
 use crate::segment::part_forest::ClassMap;
-use crate::spatial::{Label, OrganisedCloud};
 use serde::{Deserialize, Serialize};
+use tryon_geometry::spatial::{Label, OrganisedCloud};
 
 /// Kinds of classes: both sides are one, as left and right change places with the facing; the neck is the last.
 const KINDS: usize = PART_CLASSES.div_ceil(2);
@@ -23,7 +23,7 @@ const FULL_HEAD: f32 = 0.6;
 /// Covered share that stands for a head out of view.
 const HIDDEN_HEAD: f32 = 0.45;
 /// Log odds of a start per unit of similarity, covered head and matched points, and at zero: logistic regression on the
-/// starts of `tryon bench people` (furniture against people) and of recordings; see docs/decisions/047.
+/// starts of `tryon-bench people` (furniture against people) and of recordings; see docs/decisions/047.
 const START_WEIGHTS: [f32; 3] = [17.6, 8.05, 18.4];
 /// See [`START_WEIGHTS`].
 const START_BIAS: f32 = -32.4;
@@ -277,11 +277,11 @@ impl PersonBelief {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::camera::DepthImage;
+    use crate::pose_fit::FitScratch;
     use crate::segment::part_forest::{PartScratch, PersonCells};
-    use crate::tracking::pose_fit::FitScratch;
-    use crate::tracking::test_scene::{DepthScan, TestScene};
+    use crate::test_scene::{DepthScan, TestScene};
     use nalgebra::Vector3;
+    use tryon_geometry::camera::DepthImage;
 
     /// Evidence of a body in one pose with the readings of an image.
     fn evidence(scene: &TestScene, image: &DepthImage, matched: f32) -> PersonEvidence {

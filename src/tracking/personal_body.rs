@@ -1,8 +1,8 @@
 //! The rest body of the subject's size and shape, and the samples on it that the pose fit uses.
 
 use super::TrackerModel;
-use crate::body::{BodyShape, RestBody};
-use crate::math::{P3, V3};
+use tryon_body::{BodyShape, RestBody};
+use tryon_geometry::math::{P3, V3};
 
 /// Samples of the personalised rest body.
 #[derive(Clone, Debug, Default)]
@@ -64,7 +64,7 @@ impl PersonalBody {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::tracking::test_scene::TestScene;
+    use crate::test_scene::TestScene;
 
     #[test]
     fn a_sketch_has_the_samples_and_joints_of_the_update() {

@@ -4,10 +4,10 @@
 use super::extrapolation::advance_angles;
 use super::model::TrackerModel;
 use super::pose_fit::limit;
-use crate::body::parts::BodyPart;
-use crate::body::{BoneTransforms, Pose, RestBody};
-use crate::math::{Rigid, exp_so3, log_so3};
 use nalgebra::Vector3;
+use tryon_body::parts::BodyPart;
+use tryon_body::{BoneTransforms, Pose, RestBody};
+use tryon_geometry::math::{Rigid, exp_so3, log_so3};
 
 /// Parts of the body that are filtered separately.
 const PARTS: usize = BodyPart::ALL.len();
@@ -76,7 +76,7 @@ fn part_gains(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::tracking::test_scene::TestScene;
+    use crate::test_scene::TestScene;
     use nalgebra::Translation3;
     use rand::{Rng, SeedableRng};
 

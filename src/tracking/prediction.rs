@@ -4,7 +4,7 @@
 use super::TrackerState;
 use super::extrapolation::{extrapolate, motion};
 use super::pose_fit::{FitContext, FitReport, FitScratch, TRACK, evaluate, limit};
-use crate::body::Pose;
+use tryon_body::Pose;
 
 /// Loss of explained readings, against the last fit, up to which a prediction needs no coarse iterations.
 const AS_GOOD_EXPLAINED: f64 = 0.015;

@@ -4,10 +4,10 @@ use super::TrackerModel;
 use super::joint_proposals::JointProposals;
 use super::limb::Limb;
 use super::part_classes::PartKind;
-use crate::body::parts::{BodyPart, BodySide};
-use crate::body::{BoneTransforms, Pose, RestBody};
-use crate::math::{P3, P3d, Rigid, polar_rotation_3};
 use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
+use tryon_body::parts::{BodyPart, BodySide};
+use tryon_body::{BoneTransforms, Pose, RestBody};
+use tryon_geometry::math::{P3, P3d, Rigid, polar_rotation_3};
 
 /// Least number of trunk joints for an alignment.
 const LEAST_JOINTS: usize = 3;
@@ -154,10 +154,10 @@ fn procrustes(pairs: &[WeightedPair]) -> Option<nalgebra::Isometry3<f64>> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::PartClasses;
+    use crate::part_classes::PART_CLASSES;
     use crate::segment::part_forest::JointProposal;
-    use crate::tracking::PartClasses;
-    use crate::tracking::part_classes::PART_CLASSES;
-    use crate::tracking::test_scene::TestScene;
+    use crate::test_scene::TestScene;
 
     impl ProposedPoses<'_> {
         /// The trunk at its proposed joints with each limb at its heaviest proposal.

@@ -7,9 +7,9 @@ use super::pose_fit::{
     ANNEAL, FitContext, FitReport, FitScratch, HYPOTHESIS_TERMS, Schedule, TRACK, evaluate,
     fit_pose,
 };
-use crate::body::Pose;
-use crate::body::parts::BodyPart;
 use serde::{Deserialize, Serialize};
+use tryon_body::Pose;
+use tryon_body::parts::BodyPart;
 
 /// Timer of the repairs.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]

@@ -1,9 +1,9 @@
 //! Somebody who sits, told from somebody who crouches or kneels: without a seat, the body would fall backwards.
 
 use super::{JointConfidence, TrackerModel};
-use crate::math::P3d;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
+use tryon_geometry::math::P3d;
 
 /// Share of the body's mass in the trunk with head and arms; the rest is at the knees (Winter 2009, table 4.1: legs 32 %).
 const TRUNK_MASS: f64 = 0.68;
@@ -75,9 +75,9 @@ pub(super) fn sits(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::body::BoneTransforms;
-    use crate::tracking::ConfidenceReason;
-    use crate::tracking::test_scene::TestScene;
+    use crate::ConfidenceReason;
+    use crate::test_scene::TestScene;
+    use tryon_body::BoneTransforms;
 
     /// Verdict on a body with thighs raised forward by `hips`, knees bent by `knees` and the trunk leaning forward by `lean`,
     /// radians; all joints in view.

@@ -3,10 +3,10 @@
 use super::person_evidence::Verdict;
 use super::pose_fit::FitContext;
 use super::{Status, TrackerModel, TrackerState, Workspace};
-use crate::camera::RgbdFrame;
 use crate::registration::Observation;
 use crate::segment::{PersonChoice, PersonPrior, PersonSearch, contour, find_person, find_planes};
-use crate::spatial::OrganisedCloud;
+use tryon_geometry::camera::RgbdFrame;
+use tryon_geometry::spatial::OrganisedCloud;
 
 /// Frames without a subject after which the scene planes are searched again.
 const SCENE_INTERVAL: u32 = 60;

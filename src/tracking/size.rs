@@ -6,10 +6,10 @@
 
 use super::model::TrackerModel;
 use super::pose_fit::{FitContext, FitScratch, assemble, for_each_point, pair};
-use crate::body::measure::measure;
-use crate::body::{BodyShape, Pose, RestBody, Template};
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3, Vector6};
 use serde::{Deserialize, Serialize};
+use tryon_body::measure::measure;
+use tryon_body::{BodyShape, Pose, RestBody, Template};
 
 /// Accumulated information on size and shape.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -401,7 +401,7 @@ fn from_stature(model: &TrackerModel, stature: f64) -> BodyShape {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::tracking::test_scene::TestScene;
+    use crate::test_scene::TestScene;
 
     #[test]
     fn the_size_settles_once_girths_stay_for_half_a_second() {

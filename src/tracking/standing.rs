@@ -1,12 +1,12 @@
 //! Hidden feet on the floor: memory of where they stood, planted feet, an estimated floor, and knees bent to reach it.
 
 use super::model::TrackerModel;
-use crate::body::{BoneTransforms, Pose, RestBody};
-use crate::math::P3d;
 use crate::registration::residual::{FloorPlane, is_in_view};
-use crate::spatial::OrganisedCloud;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
+use tryon_body::{BoneTransforms, Pose, RestBody};
+use tryon_geometry::math::P3d;
+use tryon_geometry::spatial::OrganisedCloud;
 
 /// Floor and remembered feet of the subject.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -162,12 +162,12 @@ pub(super) fn floor_below(model: &TrackerModel, rest: &RestBody, hips: f64) -> O
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::math::Rigid;
+    use crate::kinematics::{apply, linearise};
+    use crate::pose_fit::FloorLegs;
     use crate::registration::NormalEquations;
-    use crate::tracking::kinematics::{apply, linearise};
-    use crate::tracking::pose_fit::FloorLegs;
-    use crate::tracking::test_scene::TestScene;
+    use crate::test_scene::TestScene;
     use nalgebra::{DMatrix, DVector, Translation3, UnitQuaternion};
+    use tryon_geometry::math::Rigid;
 
     /// A camera of 200 rows, whose lower rim cuts the legs.
     fn cut_scene() -> (TestScene, Vector3<f64>) {

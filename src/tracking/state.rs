@@ -10,11 +10,11 @@ use super::standing::FootMemory;
 use super::status::{LostReason, Status};
 use super::surface::SurfaceStatistics;
 use super::{TrackerConfig, TrackerModel};
-use crate::body::{BodyShape, Pose};
-use crate::math::{Camera, P3, Rigid, World};
 use crate::segment::{Refusals, ScenePlanes};
 use nalgebra::{UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
+use tryon_body::{BodyShape, Pose};
+use tryon_geometry::math::{Camera, P3, Rigid, World};
 
 /// The state of one tracked session. Saving and restoring it between two steps changes no bit of what follows.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

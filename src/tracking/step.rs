@@ -10,11 +10,11 @@ use super::report::Stopwatch;
 use super::segmentation::{LEAST_CELLS, segment};
 use super::subject::{StepLog, SubjectFrame};
 use super::{LostReason, Status, StepError, StepReport, TrackerModel, TrackerState, Workspace};
-use crate::camera::{DepthImage, RgbdFrame};
 use crate::registration::Observation;
 use crate::segment::{CandidateBox, PersonSearch};
-use crate::spatial::OrganisedCloud;
 use nalgebra::Vector3;
+use tryon_geometry::camera::{DepthImage, RgbdFrame};
+use tryon_geometry::spatial::OrganisedCloud;
 
 /// Motion per frame below which a fit is at rest, metres, and such frames in a row before frames are compared. A fit creeps
 /// for a dozen frames (an arm along the view by 0.3 mm each), and would do so in jerks.
@@ -230,7 +230,7 @@ fn lose(state: &mut TrackerState, reason: LostReason) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::tracking::test_scene::TestScene;
+    use crate::test_scene::TestScene;
 
     type Spoil = fn(&mut TrackerState);
 
@@ -327,7 +327,7 @@ mod tests {
             ("state.world_from_camera", |s| {
                 let mut pose = *s.world_from_camera.iso();
                 pose.translation.vector.y = f64::NAN;
-                s.world_from_camera = crate::math::Rigid::new(pose);
+                s.world_from_camera = tryon_geometry::math::Rigid::new(pose);
             }),
         ];
         for (name, spoil) in faults {

@@ -23,16 +23,16 @@ use super::{
     JointConfidence, LostReason, SizeEstimate, Skipped, Status, StepReport, TrackerModel,
     TrackerState, TrackingStagesMs, Workspace,
 };
-use crate::body::parts::BodyPart;
-use crate::body::{BodyShape, BoneTransforms, Pose};
-use crate::camera::RgbdFrame;
-use crate::math::{Camera, P3};
 use crate::registration::Observation;
 use crate::registration::residual::FloorPlane;
 use crate::segment::PersonSearch;
 use crate::segment::part_forest::PartScratch;
-use crate::spatial::OrganisedCloud;
 use nalgebra::Vector3;
+use tryon_body::parts::BodyPart;
+use tryon_body::{BodyShape, BoneTransforms, Pose};
+use tryon_geometry::camera::RgbdFrame;
+use tryon_geometry::math::{Camera, P3};
+use tryon_geometry::spatial::OrganisedCloud;
 
 /// Share of explained readings below which a frame is bad.
 const LEAST_EXPLAINED: f64 = 0.45;

@@ -1,13 +1,13 @@
 //! Surface displacements along the rest normals (section 3.3, eq. 13 to 17), by warm-started conjugate gradients.
 
 use super::pose_fit::{FitContext, FitScratch};
-use crate::body::{BoneTransforms, RestBody, Template, skin};
-use crate::math::{P3, V3};
-use crate::mesh::Csr;
-use crate::par::Par;
 use crate::registration::IndexImage;
-use crate::spatial::Label;
 use serde::{Deserialize, Serialize};
+use tryon_body::{BoneTransforms, RestBody, Template, skin};
+use tryon_geometry::math::{P3, V3};
+use tryon_geometry::mesh::Csr;
+use tryon_geometry::par::Par;
+use tryon_geometry::spatial::Label;
 
 /// Mean and variance of each displacement, updated online.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -262,8 +262,8 @@ impl SurfaceSystem<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::body::embedded;
     use rand::{Rng, SeedableRng};
+    use tryon_body::embedded;
 
     #[test]
     fn the_system_is_symmetric_and_positive() {

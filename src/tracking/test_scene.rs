@@ -3,14 +3,14 @@
 use super::personal_body::PersonalBody;
 use super::pose_fit::FitContext;
 use super::{TrackerConfig, TrackerModel, TrackerState};
-use crate::body::{BoneTransforms, Pose, RestBody, embedded, skin};
-use crate::camera::{Calibration, DepthImage, Intrinsics};
-use crate::math::{P3, P3d};
-use crate::par::Par;
-use crate::raster::{View, VisibilityBuffer, rasterise};
 use crate::registration::Observation;
 use crate::segment::{Contour, contour};
-use crate::spatial::{Label, OrganisedCloud, PointTree};
+use tryon_body::{BoneTransforms, Pose, RestBody, embedded, skin};
+use tryon_geometry::camera::{Calibration, DepthImage, Intrinsics};
+use tryon_geometry::math::{P3, P3d};
+use tryon_geometry::par::Par;
+use tryon_geometry::raster::{View, VisibilityBuffer, rasterise};
+use tryon_geometry::spatial::{Label, OrganisedCloud, PointTree};
 
 pub(super) struct TestScene {
     pub model: TrackerModel,

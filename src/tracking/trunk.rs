@@ -1,9 +1,9 @@
 //! The trunk as a column that arms do not enter.
 
 use super::limb::Limb;
-use crate::body::parts::{EllipticSection, TrunkFrame};
-use crate::body::{BodyShape, BoneTransforms, Template};
 use crate::registration::residual::EllipticColumn;
+use tryon_body::parts::{EllipticSection, TrunkFrame};
+use tryon_body::{BodyShape, BoneTransforms, Template};
 
 /// Share of the section that counts as inside: hands press into clothes and soft bodies.
 const SLACK: f64 = 0.65;
@@ -50,9 +50,9 @@ impl Trunk {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::body::{Pose, embedded};
-    use crate::math::{Body, Camera, Rigid};
-    use crate::tracking::limb;
+    use crate::limb;
+    use tryon_body::{Pose, embedded};
+    use tryon_geometry::math::{Body, Camera, Rigid};
 
     #[test]
     fn arms_at_rest_are_outside_and_a_point_in_the_chest_is_inside() {

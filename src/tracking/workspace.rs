@@ -5,12 +5,12 @@ use super::personal_body::PersonalBody;
 use super::pose_fit::FitScratch;
 use super::surface::SurfaceScratch;
 use super::{TrackerModel, TrackerState};
-use crate::body::{BodyShape, BoneTransforms, RestBody, skin};
-use crate::math::P3;
-use crate::par::Par;
 use crate::segment::part_forest::PartScratch;
 use crate::segment::{Contour, SegmentScratch};
-use crate::spatial::OrganisedCloud;
+use tryon_body::{BodyShape, BoneTransforms, RestBody, skin};
+use tryon_geometry::math::P3;
+use tryon_geometry::par::Par;
+use tryon_geometry::spatial::OrganisedCloud;
 
 /// Scratch memory of [`super::step`]; one per thread that steps.
 #[derive(Default)]

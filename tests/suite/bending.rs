@@ -5,10 +5,10 @@ use crate::common::{DT, step_on};
 use tryon::body::{BodyShape, Pose, RestBody, Template, embedded};
 use tryon::cloth::{Config, StepReport, Workspace};
 use tryon::dressing::{DressOptions, dress};
-use tryon::evaluate::Solid;
 use tryon::garment::{Size, Triangulation, library};
-use tryon::math::{P3, World};
-use tryon::spatial::intersections;
+use tryon::geometry::math::{P3, World};
+use tryon::geometry::spatial::intersections;
+use tryon_bench::Solid;
 
 /// Bending and straightening again takes so many calls, two seconds, and the person stands for so many more.
 const CALLS: usize = 60;

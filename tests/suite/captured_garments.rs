@@ -9,11 +9,11 @@ use tryon::clothcap::scan::BodyScan;
 use tryon::clothcap::segment::{LabelConfig, Slot};
 use tryon::clothcap::{CaptureConfig, OutfitCapture};
 use tryon::dressing::{DressOptions, FitProbe, GarmentSource, dress_all};
-use tryon::evaluate::garment_capture::capture_scenes;
 use tryon::formats::scan::ScanMesh;
 use tryon::garment::{Material, Size};
-use tryon::math::{Body, Rigid, World};
+use tryon::geometry::math::{Body, Rigid, World};
 use tryon::mirror::{CapturedWardrobe, Choice};
+use tryon_bench::garment_capture::capture_scenes;
 
 const HEAVY: &[f64] = &[0.3, 2.0, 1.2, -0.2, 0.2, 0.3, 0.0, 0.6, 0.0];
 

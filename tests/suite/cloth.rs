@@ -9,9 +9,9 @@ use tryon::body::{BodyShape, Pose, RestBody};
 use tryon::cloth::{Config, Input, Model, State, StepReport, Workspace, step};
 use tryon::dressing::{DressOptions, dress};
 use tryon::garment::{Size, Triangulation, library};
-use tryon::math::{Body, P3, Rigid, V3, V3d, World, log_so3};
-use tryon::par::with_threads;
-use tryon::spatial::intersections;
+use tryon::geometry::math::{Body, P3, Rigid, V3, V3d, World, log_so3};
+use tryon::geometry::par::with_threads;
+use tryon::geometry::spatial::intersections;
 
 struct Dressed {
     model: Model,

@@ -1,37 +1,15 @@
 //! Shared data, standing bodies and single cloth steps for the tests of this binary.
 
-use std::path::PathBuf;
 use tryon::body::{BoneTransforms, Pose, RestBody, Template, skin};
 use tryon::cloth::ClothError;
 use tryon::cloth::{Input, Model, State, StepReport, Workspace, step};
-use tryon::evaluate::rest::lower_arms;
-use tryon::math::{Body, P3, Rigid, World};
-use tryon::par::Par;
-
-/// A path below `../shared/data` (or `$TRYON_SHARED/data`). When it is missing the test says so loudly and skips;
-/// with `TRYON_REQUIRE_ALL=1` it fails.
-pub(crate) fn shared(path: &str) -> Option<PathBuf> {
-    let root = std::env::var_os("TRYON_SHARED").map_or_else(
-        || PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../shared"),
-        PathBuf::from,
-    );
-    let full = root.join("data").join(path);
-    if full.exists() {
-        return Some(full);
-    }
-    assert!(
-        std::env::var_os("TRYON_REQUIRE_ALL").is_none(),
-        "{} is missing",
-        full.display()
-    );
-    eprintln!("SKIPPED: {} is missing", full.display());
-    None
-}
+use tryon::geometry::math::{Body, P3, Rigid, World};
+use tryon::geometry::par::Par;
 
 /// Standing with the arms hanging down.
 pub(crate) fn arms_down(template: &Template, rest: &RestBody) -> Pose<World> {
     let mut p = Pose::rest(template.skeleton(), Rigid::<World, Body>::identity());
-    lower_arms(template, rest, 1.3, &mut p);
+    p.lower_arms(template.skeleton(), rest, 1.3);
     p
 }
 

@@ -1,15 +1,15 @@
 //! Tracking with other people and objects in the picture, with mounted cameras, and with skipped work.
 
-use crate::common::shared;
 use std::sync::Arc;
 use tryon::body::Template;
-use tryon::camera::NoiseModel;
-use tryon::evaluate::DepthScene;
-use tryon::evaluate::scenes;
-use tryon::evaluate::tracking::{TrackOutcome, follow, mean};
-use tryon::math::P3d;
+use tryon::formats::shared_data;
+use tryon::geometry::camera::NoiseModel;
+use tryon::geometry::math::P3d;
 use tryon::synth::{Actor, Routine, Sequence, Setting};
 use tryon::tracking::{ConfidenceReason, TrackerConfig};
+use tryon_bench::DepthScene;
+use tryon_bench::scenes;
+use tryon_bench::tracking::{TrackOutcome, follow, mean};
 
 /// An actor alone in the dark, without colour.
 fn alone() -> Setting {
@@ -348,8 +348,10 @@ fn each_skip_keeps_its_bound() {
         &still,
         &[("unchanged frames", unchanged, 2.0, 2.0)],
     );
-    let (Some(folder), Some(data)) = (shared("sequences/charleston_m_heavy_tof_room"), shared("."))
-    else {
+    let (Some(folder), Some(data)) = (
+        shared_data("sequences/charleston_m_heavy_tof_room"),
+        shared_data("."),
+    ) else {
         return;
     };
     let template = scenes::subject(&data, "template").expect("template");
@@ -428,8 +430,10 @@ fn compare_skips(
 
 #[test]
 fn limb_recovery_finds_an_arm_lost_at_low_rate() {
-    let (Some(folder), Some(data)) = (shared("sequences/jacks_f_avg_kinect1_room"), shared("."))
-    else {
+    let (Some(folder), Some(data)) = (
+        shared_data("sequences/jacks_f_avg_kinect1_room"),
+        shared_data("."),
+    ) else {
         return;
     };
     let template = scenes::subject(&data, "template").expect("template");

@@ -1,14 +1,14 @@
 //! A T-shirt and a skirt on a body that dances fast and touches itself.
 
-use crate::common::shared;
 use tryon::body::parts::vertex_masks;
 use tryon::cloth::Config;
-use tryon::evaluate::OutfitSpec;
-use tryon::evaluate::dance::load;
+use tryon::formats::shared_data;
+use tryon_bench::OutfitSpec;
+use tryon_bench::dance::load;
 
 #[test]
 fn an_outfit_survives_a_dance_outside_the_body_and_unstretched() {
-    let Some(folder) = shared("garments/cipc_apache2") else {
+    let Some(folder) = shared_data("garments/cipc_apache2") else {
         return;
     };
     let dance = load(&folder).unwrap();

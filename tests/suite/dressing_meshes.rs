@@ -1,6 +1,6 @@
 //! Mesh garments on bodies that they were not made on, and sizes that cannot be worn.
 
-use crate::common::{posed, shared};
+use crate::common::posed;
 use std::path::{Path, PathBuf};
 use tryon::body::{BodyShape, Pose, RestBody, Template, embedded};
 use tryon::cloth::{Config, Input, Workspace, step};
@@ -8,8 +8,9 @@ use tryon::dressing::{
     DressError, DressOptions, Dressed, GarmentSource, MeshGarment, SourceBody, dress, dress_all,
 };
 use tryon::formats::gltf::{GlbMesh, write_glb};
+use tryon::formats::shared_data;
 use tryon::garment::{GarmentKind, Material, Size, library};
-use tryon::math::{Body, Rigid, World, log_so3};
+use tryon::geometry::math::{Body, Rigid, World, log_so3};
 
 const AVERAGE: &[f64] = &[];
 const HEAVY: &[f64] = &[0.3, 2.0, 1.2, -0.2, 0.2, 0.3, 0.0, 0.6, 0.0];
@@ -40,7 +41,7 @@ fn standing(template: &Template, rest: &RestBody, down: f64) -> Pose<World> {
 }
 
 fn clothes(file: &str) -> Option<PathBuf> {
-    shared(&format!("garments/makehuman_clothes_cc0/{file}.mhclo"))
+    shared_data(format!("garments/makehuman_clothes_cc0/{file}.mhclo"))
 }
 
 fn read(file: &Path, body: Option<SourceBody>) -> MeshGarment {
@@ -123,7 +124,7 @@ fn shirt_and_trousers(body: Option<SourceBody>) {
 
 #[test]
 fn makehuman_clothes_are_retargeted_to_bodies_of_ours() {
-    let Some(base) = shared("body/makehuman_hm08_cc0/makehuman_app/3dobjs/base.obj") else {
+    let Some(base) = shared_data("body/makehuman_hm08_cc0/makehuman_app/3dobjs/base.obj") else {
         return;
     };
     shirt_and_trousers(Some(SourceBody::read(&base).expect("a body")));
@@ -137,7 +138,7 @@ fn a_guessed_source_body_suffices() {
 #[test]
 fn hats_follow_the_head_rigidly() {
     let (Some(base), Some(hat)) = (
-        shared("body/makehuman_hm08_cc0/makehuman_app/3dobjs/base.obj"),
+        shared_data("body/makehuman_hm08_cc0/makehuman_app/3dobjs/base.obj"),
         clothes("fedora01/fedora"),
     ) else {
         return;

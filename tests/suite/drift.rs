@@ -3,10 +3,10 @@
 //! `TRYON_LONG_TESTS=1` runs the long forms: 100,000 frames back and forth.
 
 use crate::tracked::{fixed_size, joints, long, own_body, recorded, template};
-use tryon::camera::{NoiseModel, RgbdFrame};
-use tryon::evaluate::tracking::mean;
+use tryon::geometry::camera::{NoiseModel, RgbdFrame};
 use tryon::synth::Routine;
 use tryon::tracking::{TrackerConfig, TrackerModel, TrackerState, Workspace, step};
+use tryon_bench::tracking::mean;
 
 /// Rounds whose mean is a joint's position.
 ///

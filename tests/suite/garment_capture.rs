@@ -1,6 +1,5 @@
 //! Garment capture: the real scan against hand-made labels, synthetic ones against their truth, and scans that are damaged.
 
-use crate::common::shared;
 use nalgebra::Rotation3;
 use rand::{Rng, SeedableRng};
 use std::path::Path;
@@ -14,14 +13,15 @@ use tryon::clothcap::{
     BodyDresser, CaptureConfig, CaptureError, OutfitCapture, ScanSegmenter, SegmentedScan,
     population,
 };
-use tryon::evaluate::garment_capture::{
+use tryon::formats::scan::{ScanMesh, read_scan};
+use tryon::formats::shared_data;
+use tryon::geometry::math::{P3, V3};
+use tryon::synth::{Posture, Routine};
+use tryon_bench::garment_capture::{
     CaptureScene, CaptureVariant, CloudCell, capture_scenes, film_clouds, measure, measure_cloud,
     measure_turn_scene, turn_scenes,
 };
-use tryon::evaluate::scans::{SKIN_LABEL, ScanMotion, ScanScene, TrueScan};
-use tryon::formats::scan::{ScanMesh, read_scan};
-use tryon::math::{P3, V3};
-use tryon::synth::{Posture, Routine};
+use tryon_bench::scans::{SKIN_LABEL, ScanMotion, ScanScene, TrueScan};
 
 /// Unsigned bytes of an npy file.
 fn bytes_of_npy(path: &Path) -> Vec<u8> {
@@ -59,7 +59,7 @@ fn segmented(
 /// Hand-made labels: 0 skin, 1 waistcoat, 2 shirt and tie, 3 trousers, 4 shoes.
 #[test]
 fn a_real_mans_waistcoat_shirt_and_trousers_are_found() {
-    let Some(folder) = shared("scans/liam") else {
+    let Some(folder) = shared_data("scans/liam") else {
         return;
     };
     let file = read_scan(&folder.join("00000.ply")).expect("a scan");

@@ -5,7 +5,7 @@ use tryon::cloth::{self, Input};
 use tryon::dressing::{DressOptions, dress};
 use tryon::formats::{POSITION_STEP, PositionCoder};
 use tryon::garment::{Size, library};
-use tryon::math::{P3, World};
+use tryon::geometry::math::{P3, World};
 use tryon::synth::{Actor, Sequence, Setting};
 
 /// Bytes a vertex and frame that a stream may take (the goal is 2).

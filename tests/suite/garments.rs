@@ -11,9 +11,10 @@ use tryon::formats::garmentcode::{parse_garmentcode, read_garmentcode};
 use tryon::formats::mhclo::read_mhclo;
 use tryon::formats::obj::read_obj;
 use tryon::formats::sewn_obj::read_sewn_obj;
+use tryon::formats::shared_data;
 use tryon::garment::import::{from_garmentcode, from_mesh};
 use tryon::garment::{GarmentKind, Material, Pattern, Size, Triangulation, library};
-use tryon::math::log_so3;
+use tryon::geometry::math::log_so3;
 
 /// Stature, girth, sex and so on in standard deviations.
 const BODIES: [(&str, &[f64]); 3] = [
@@ -318,7 +319,7 @@ fn an_outer_layer_lies_outside_the_inner_one() {
 }
 
 fn garmentcode() -> Option<Vec<std::path::PathBuf>> {
-    let folder = crate::common::shared("garments/garmentcode_mit/Patterns")?;
+    let folder = shared_data("garments/garmentcode_mit/Patterns")?;
     let mut files: Vec<_> = std::fs::read_dir(folder)
         .expect("a folder")
         .flatten()
@@ -418,7 +419,7 @@ fn damaged_garmentcode_files_are_refused_or_read_but_never_panic() {
 
 #[test]
 fn the_stitched_dress_becomes_one_surface() {
-    let Some(path) = crate::common::shared("garments/cipc_apache2/dress_knife/stage.obj") else {
+    let Some(path) = shared_data("garments/cipc_apache2/dress_knife/stage.obj") else {
         return;
     };
     let sewn = read_sewn_obj(&path).expect("read");
@@ -494,7 +495,7 @@ fn a_fit_map_separates_a_tight_size_from_a_loose_one() {
 
 #[test]
 fn measured_fabrics_become_materials() {
-    let Some(folder) = crate::common::shared("materials/wang2011_arcsim_NONCOMMERCIAL") else {
+    let Some(folder) = shared_data("materials/wang2011_arcsim_NONCOMMERCIAL") else {
         return;
     };
     let mut seen = 0;
@@ -515,8 +516,8 @@ fn measured_fabrics_become_materials() {
 #[test]
 fn makehuman_clothes_fit_their_base_mesh() {
     let (Some(folder), Some(base)) = (
-        crate::common::shared("garments/makehuman_clothes_cc0"),
-        crate::common::shared("body/makehuman_hm08_cc0/makehuman_app/3dobjs/base.obj"),
+        shared_data("garments/makehuman_clothes_cc0"),
+        shared_data("body/makehuman_hm08_cc0/makehuman_app/3dobjs/base.obj"),
     ) else {
         return;
     };

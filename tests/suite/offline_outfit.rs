@@ -4,11 +4,11 @@ use crate::common::{DT, arms_down, posed};
 use std::ops::ControlFlow;
 use tryon::body::measure::measure;
 use tryon::body::{BodyShape, Pose, embedded};
-use tryon::contact::{ContactMesh, ContactSurface};
-use tryon::math::{P3, Rigid, V3, V3d, World};
+use tryon::cloth::contact::{ContactMesh, ContactSurface};
+use tryon::cloth::fine::{FrameTargets, JoinedSurfaces, OfflineSolver};
+use tryon::geometry::math::{P3, Rigid, V3, V3d, World};
+use tryon::geometry::par::Par;
 use tryon::mirror::{Choice, DressedOutfit, OfflineOutfit, PutOn, Subject};
-use tryon::offline::{FrameTargets, JoinedSurfaces, OfflineSolver};
-use tryon::par::Par;
 
 /// A coarse skirt on the mean body, at rest; triangles and vertices of the body.
 fn worn() -> (DressedOutfit, Vec<[u32; 3]>, Vec<P3>) {

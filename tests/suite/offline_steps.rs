@@ -1,14 +1,14 @@
 //! Length of the offline solver's steps: motion that implicit steps damp does not shorten them.
 
 use nalgebra::Vector2;
-use tryon::elastic::RestSheet;
-use tryon::garment::Material;
-use tryon::math::V3d;
-use tryon::offline::{
+use tryon::cloth::elastic::RestSheet;
+use tryon::cloth::fine::{
     FrameTargets, MotionState, OfflineCloth, OfflineSettings, OfflineSolver, OfflineState,
     StitchSprings,
 };
-use tryon::par::Par;
+use tryon::garment::Material;
+use tryon::geometry::math::V3d;
+use tryon::geometry::par::Par;
 
 /// Square of 0.2 m of 10 × 10 quads: triangles and material coordinates.
 fn square() -> (Vec<[u32; 3]>, Vec<Vector2<f64>>) {

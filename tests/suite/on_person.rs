@@ -1,10 +1,10 @@
 //! Sleeves on fast arms, from the first frame: garments off the recorded person in pictures of whole sequences.
 
-use crate::common::shared;
 use tryon::body::embedded;
-use tryon::composite::OffPerson;
 use tryon::formats::open_recording;
+use tryon::formats::shared_data;
 use tryon::mirror::{Choice, Mirror};
+use tryon::view::OffPerson;
 
 /// Share of the dressed pictures with more than [`OffPerson::LIMIT`] off the person, at most. Measured: 0; with arms turned
 /// out for the cloth's sake 0.35 (charleston) and 0.16 (jacks).
@@ -14,7 +14,7 @@ const LEAST_DRESSED: f64 = 0.98;
 
 /// Dresses a sequence in a long-sleeved shirt and judges its pictures.
 fn check(sequence: &str) {
-    let Some(folder) = shared(sequence) else {
+    let Some(folder) = shared_data(sequence) else {
         return;
     };
     let mut recording = open_recording(&folder).expect("a recording");

@@ -2,9 +2,9 @@
 
 use std::sync::{Mutex, MutexGuard, OnceLock};
 use tryon::cloth::Config;
-use tryon::evaluate::OutfitSpec;
-use tryon::evaluate::rest::{Motion, RestReport, RestingSubject};
-use tryon::par::with_threads;
+use tryon::geometry::par::with_threads;
+use tryon_bench::OutfitSpec;
+use tryon_bench::rest::{Motion, RestReport, RestingSubject};
 
 /// A skirt and a shirt over it, edges of 2 cm.
 fn subject() -> MutexGuard<'static, RestingSubject> {

@@ -4,8 +4,8 @@ use crate::tracked::{bones, frame, picture};
 use nalgebra::{UnitQuaternion, Vector3};
 use std::f64::consts::PI;
 use tryon::body::{Pose, embedded};
-use tryon::camera::{Calibration, Intrinsics};
-use tryon::math::{Camera, Rigid};
+use tryon::geometry::camera::{Calibration, Intrinsics};
+use tryon::geometry::math::{Camera, Rigid};
 use tryon::tracking::{TrackerConfig, TrackerModel, TrackerState, Workspace, step};
 
 /// Angles of named joints: a rotation vector each, or one number for a hinge, radians.

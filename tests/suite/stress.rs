@@ -6,15 +6,15 @@ use crate::tracked::{
     data, fixed_size, frame, joints, long, own_body, picture, quiet, recorded, template,
 };
 use tryon::body::Pose;
-use tryon::camera::{Calibration, DepthImage, Intrinsics, NoiseModel};
-use tryon::evaluate::tracking::{follow, mean};
-use tryon::evaluate::{DepthScene, scenes};
-use tryon::math::{P3d, Rigid};
+use tryon::geometry::camera::{Calibration, DepthImage, Intrinsics, NoiseModel};
+use tryon::geometry::math::{P3d, Rigid};
 use tryon::synth::Routine;
 use tryon::tracking::{
     ConfidenceReason, LostReason, Status, TrackerConfig, TrackerModel, TrackerState, Workspace,
     step,
 };
+use tryon_bench::tracking::{follow, mean};
+use tryon_bench::{DepthScene, scenes};
 
 #[test]
 fn lost_and_corrupt_pixels_cost_little() {

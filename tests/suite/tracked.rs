@@ -1,17 +1,17 @@
 //! Bodies, scenes and frames that the tests of tracking share.
 
-use crate::common::shared;
 use std::path::PathBuf;
 use std::sync::Arc;
 use tryon::body::{BoneTransforms, Pose, RestBody, Template, skin};
-use tryon::camera::{DepthImage, Intrinsics, NoiseModel, RgbdFrame};
-use tryon::evaluate::tracking::{TrackOutcome, follow};
-use tryon::evaluate::{DepthScene, scenes};
-use tryon::math::P3d;
-use tryon::par::Par;
-use tryon::raster::{View, VisibilityBuffer, rasterise};
+use tryon::formats::shared_data;
+use tryon::geometry::camera::{DepthImage, Intrinsics, NoiseModel, RgbdFrame};
+use tryon::geometry::math::P3d;
+use tryon::geometry::par::Par;
+use tryon::geometry::raster::{View, VisibilityBuffer, rasterise};
 use tryon::synth::{Actor, Routine, Sequence, Setting};
 use tryon::tracking::{TrackerConfig, TrackerModel, TrackerState};
+use tryon_bench::tracking::{TrackOutcome, follow};
+use tryon_bench::{DepthScene, scenes};
 
 const CHARLESTON: &str = "sequences/charleston_m_heavy_tof_room";
 
@@ -21,7 +21,7 @@ pub(crate) fn long() -> bool {
 }
 
 pub(crate) fn data() -> Option<PathBuf> {
-    shared(".")
+    shared_data(".")
 }
 
 /// Template that the shared sequences are tracked with.
@@ -31,7 +31,7 @@ pub(crate) fn template() -> Option<Arc<Template>> {
 
 /// The first frames of a recorded dance.
 pub(crate) fn recorded(frames: usize) -> Option<DepthScene> {
-    let mut scene = DepthScene::open(&shared(CHARLESTON)?).expect("scene");
+    let mut scene = DepthScene::open(&shared_data(CHARLESTON)?).expect("scene");
     scene.frames.truncate(frames);
     scene.truth.truncate(frames);
     Some(scene)

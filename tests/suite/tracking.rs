@@ -1,14 +1,14 @@
 //! Tracking of real motions with known truth, and of frames that fail.
 
-use crate::common::shared;
 use crate::tracked::{frame, joints, template};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use tryon::body::{Template, import::template_from_smpl};
-use tryon::camera::{Calibration, DepthImage, Intrinsics};
 use tryon::formats::image::read_png_depth;
 use tryon::formats::npz::read_smpl;
-use tryon::par::with_threads;
+use tryon::formats::shared_data;
+use tryon::geometry::camera::{Calibration, DepthImage, Intrinsics};
+use tryon::geometry::par::with_threads;
 use tryon::tracking::{
     LostReason, Status, StepError, StepReport, TrackerConfig, TrackerModel, TrackerState,
     Workspace, step,
@@ -28,7 +28,7 @@ struct Sequence {
 
 impl Sequence {
     fn open(path: &str) -> Option<Self> {
-        let folder = shared(path)?;
+        let folder = shared_data(path)?;
         let read = |f: &str| std::fs::read_to_string(folder.join(f));
         let camera =
             serde_json::from_str(&read("camera.json").expect("camera.json")).expect("camera.json");
@@ -142,7 +142,7 @@ fn with_its_own_body_every_sequence_keeps_the_bar() {
         let Some(s) = Sequence::open(path) else {
             return;
         };
-        let Some(body) = shared(&format!("body/makehuman_smpl_layout/subject_{subject}.npz"))
+        let Some(body) = shared_data(format!("body/makehuman_smpl_layout/subject_{subject}.npz"))
         else {
             return;
         };

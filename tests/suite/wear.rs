@@ -4,8 +4,7 @@ use crate::common::{DT, arms_down, posed};
 use tryon::body::measure::measure;
 use tryon::body::{BodyShape, Pose, RestBody, Template, embedded};
 use tryon::cloth::{StepReport, WornReference};
-use tryon::evaluate::rest::lower_arms;
-use tryon::math::{Rigid, V3, World};
+use tryon::geometry::math::{Rigid, V3, World};
 use tryon::mirror::{Choice, DressedOutfit, PutOn, Subject};
 
 struct Fitting {
@@ -61,7 +60,7 @@ fn coarse_garments_have_fewer_vertices_and_skin_carries_them_along() {
     assert!((1.8..3.5).contains(&ratio), "{ratio}");
 
     let mut raised = arms_down(&fine.template, &fine.rest);
-    lower_arms(&fine.template, &fine.rest, -0.2, &mut raised);
+    raised.lower_arms(fine.template.skeleton(), &fine.rest, -0.2);
     let body = posed(&fine.template, &fine.rest, &raised);
     let skinned = coarse.outfit.skinned(&body).expect("a body");
     let mut stepped = coarse;
@@ -87,7 +86,7 @@ fn arms_that_jump_have_their_sleeves_on_them_in_the_same_step() {
     let reference = WornReference::new(&f.outfit.model, &f.outfit.state);
 
     let mut raised = down.clone();
-    lower_arms(&f.template, &f.rest, -0.6, &mut raised);
+    raised.lower_arms(f.template.skeleton(), &f.rest, -0.6);
     let report = f.step(&raised);
     assert!(report.p99_strain < 0.25, "{}", report.p99_strain);
     let offset = reference.limb_offset(&f.outfit.model, &f.outfit.state);

@@ -53,21 +53,19 @@ fn expand_group(text: &str, prefix: &mut Vec<String>, out: &mut Vec<Vec<String>>
     at + 1
 }
 
-/// Module path of a file of the library: `src/a/b.rs` and `src/a/b/mod.rs` are `a::b`.
+/// Crate and module path of a file of `src/`: `src/a/b.rs` and `src/a/b/mod.rs` are `a::b`, `src/a/lib.rs` is `a`.
 fn module_path(path: &str) -> Vec<String> {
     let inner = path.strip_prefix("src/").unwrap_or(path);
     let inner = inner.strip_suffix(".rs").unwrap_or(inner);
     let inner = inner.strip_suffix("/mod").unwrap_or(inner);
-    if inner == "lib" {
-        return Vec::new();
-    }
+    let inner = inner.strip_suffix("/lib").unwrap_or(inner);
     inner.split('/').map(str::to_owned).collect()
 }
 
-/// Path segments from the crate's root, `from` being the module that names them.
+/// Path segments from the crate on, `from` being the module that names them.
 fn absolute(from: &[String], path: &[String]) -> Vec<String> {
     let mut base: Vec<String> = if path[0] == "crate" {
-        Vec::new()
+        from[..1].to_vec()
     } else {
         from.to_vec()
     };
@@ -133,7 +131,7 @@ impl<'a> Library<'a> {
         Some(module.to_vec())
     }
 
-    /// Files that each file imports from, within the same top module; a re-export is no import.
+    /// Files that each file imports from, within the same crate; a re-export is no import.
     pub(crate) fn imports(&self) -> BTreeMap<Vec<String>, BTreeSet<Vec<String>>> {
         let mut graph = BTreeMap::new();
         for (module, file) in &self.files {
@@ -148,7 +146,7 @@ impl<'a> Library<'a> {
                 .iter()
                 .filter_map(|p| self.file_of(&absolute(module, p), 0))
                 .filter(|other| other != module && other.first() == module.first())
-                .filter(|other| !other.is_empty())
+                .filter(|other| other.len() > 1)
                 .collect();
             graph.insert(module.clone(), named);
         }
@@ -212,22 +210,4 @@ pub(crate) fn circles(graph: &BTreeMap<Vec<String>, BTreeSet<Vec<String>>>) -> V
         }
     }
     found.into_iter().collect()
-}
-
-/// Top modules named after `crate::`.
-pub(crate) fn modules_named(code: &str) -> Vec<String> {
-    paths(code)
-        .into_iter()
-        .filter(|path| path[0] == "crate" && path.len() > 1)
-        .map(|mut path| path.swap_remove(1))
-        .collect()
-}
-
-/// True where code names an external crate at the start of a path: `formats::mcap::x` is ours, `mcap::x` is not.
-pub(crate) fn names_crate(code: &str, name: &str) -> bool {
-    code.match_indices(&format!("{name}::")).any(|(at, _)| {
-        let before = &code[..at];
-        let last = before.chars().last();
-        !before.ends_with("::") && !last.is_some_and(|c| c.is_alphanumeric() || c == '_')
-    })
 }

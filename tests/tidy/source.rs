@@ -34,7 +34,9 @@ pub(crate) fn files(dirs: &[&str], extension: &str) -> Vec<SourceFile> {
 /// Rust written by hand.
 pub(crate) fn rust() -> Vec<SourceFile> {
     files(
-        &["src", "proto", "services", "tests", "benches", "examples"],
+        &[
+            "src", "proto", "services", "tests", "benches", "examples", "tools",
+        ],
         "rs",
     )
 }
@@ -72,122 +74,6 @@ pub(crate) fn code_without_tests(source: &str) -> String {
         Some(at) => code[..at].to_owned(),
         None => code,
     }
-}
-
-/// True if the text declares an item: `declares("pub fn step(", "fn", "step")`.
-pub(crate) fn declares(text: &str, kind: &str, name: &str) -> bool {
-    let ends = |rest: &str| !rest.starts_with(|c: char| c.is_alphanumeric() || c == '_');
-    let item = format!("{kind} {name}");
-    let mut found = text.match_indices(&item);
-    found.any(|(at, words)| ends(&text[at + words.len()..]))
-}
-
-/// A function as rustfmt lays it out.
-pub(crate) struct Function {
-    pub(crate) name: String,
-    /// Line of `fn`, from 1.
-    pub(crate) line: usize,
-    /// Lines from `fn` to its closing brace.
-    pub(crate) length: usize,
-}
-
-/// Functions with a body of more than one line, nested ones too.
-pub(crate) fn functions(source: &str) -> Vec<Function> {
-    let lines: Vec<&str> = source.lines().collect();
-    let mut found = Vec::new();
-    for (n, line) in lines.iter().enumerate() {
-        let Some(name) = function_name(line) else {
-            continue;
-        };
-        let indent = &line[..line.len() - line.trim_start().len()];
-        let close = format!("{indent}}}");
-        let one_line = line.ends_with(';') || line.ends_with('}');
-        let end = lines[n + 1..].iter().position(|l| {
-            let declared_only =
-                l.starts_with(indent) && !l[indent.len()..].starts_with(' ') && l.ends_with(';');
-            *l == close || declared_only
-        });
-        if let (false, Some(end)) = (one_line, end) {
-            found.push(Function {
-                name,
-                line: n + 1,
-                length: end + 2,
-            });
-        }
-    }
-    found
-}
-
-/// A function as declared.
-pub(crate) struct Signature {
-    pub(crate) name: String,
-    /// Line of `fn`, from 1.
-    pub(crate) line: usize,
-    /// Number of parameters without `self`.
-    pub(crate) parameters: usize,
-}
-
-/// Functions with or without a body, nested ones too.
-pub(crate) fn signatures(code: &str) -> Vec<Signature> {
-    let lines: Vec<&str> = code.lines().collect();
-    let mut found = Vec::new();
-    for (n, line) in lines.iter().enumerate() {
-        if let Some(name) = function_name(line) {
-            found.push(Signature {
-                name,
-                line: n + 1,
-                parameters: parameters(&lines[n..].join("\n")),
-            });
-        }
-    }
-    found
-}
-
-/// Number of parameters without `self` of the function that opens the text.
-fn parameters(text: &str) -> usize {
-    let (mut depth, mut start, mut list) = (0_usize, 0, Vec::new());
-    for (at, c) in text.char_indices() {
-        match c {
-            '(' | '[' | '{' | '<' => {
-                if depth == 0 {
-                    start = at + 1;
-                    list.clear(); // generics, or `pub(crate)`
-                }
-                depth += 1;
-            }
-            ',' if depth == 1 => {
-                list.push(&text[start..at]);
-                start = at + 1;
-            }
-            '>' if text[..at].ends_with('-') => {}
-            ')' | ']' | '}' | '>' => {
-                depth = depth.saturating_sub(1);
-                if depth == 0 && c == ')' && !text[..start].ends_with("pub(") {
-                    list.push(&text[start..at]);
-                    break;
-                }
-            }
-            _ => {}
-        }
-    }
-    let is_self = |p: &str| p.ends_with("self") || p.starts_with("self:");
-    let list = list.iter().map(|p| p.trim());
-    list.filter(|p| !p.is_empty() && !is_self(p)).count()
-}
-
-/// Name declared by a line that opens a function, with any qualifiers before `fn`.
-fn function_name(line: &str) -> Option<String> {
-    let (before, after) = line.split_once("fn ")?;
-    let qualifier = |word: &str| {
-        word.starts_with("pub")
-            || ["const", "async", "unsafe", "extern", "\"C\"", "crate)"].contains(&word)
-    };
-    before.split_whitespace().all(qualifier).then_some(())?;
-    let name: String = after
-        .chars()
-        .take_while(|c| c.is_alphanumeric() || *c == '_')
-        .collect();
-    (!name.is_empty()).then_some(name)
 }
 
 /// Names of the structs, enums, traits and type aliases that code declares outside its tests.

@@ -6,8 +6,8 @@ use nalgebra::{Point3, Vector3};
 use tryon::body::{
     BodyShape, Joint, JointMotion, Pose, ShapeSpace, Skeleton, SkinWeights, Template,
 };
-use tryon::math::{Camera, P3, V3};
-use tryon::mesh::TriMesh;
+use tryon::geometry::math::{Camera, P3, V3};
+use tryon::geometry::mesh::TriMesh;
 use tryon::tracking::KnownBody;
 
 const MAX_VERTICES: u32 = 65_536;
@@ -343,7 +343,7 @@ mod tests {
         assert_eq!(back.shape_space(), t.shape_space());
         let pose = Pose {
             angles: vec![0.1, 0.2, 0.3, 0.4],
-            root: tryon::math::Rigid::identity(),
+            root: tryon::geometry::math::Rigid::identity(),
         };
         assert_eq!(pose_from_wire(&pose_to_wire(&pose), 4).expect("same"), pose);
         let shape = BodyShape {
@@ -450,9 +450,10 @@ mod tests {
             "body_template.shape_directions[0].joints"
         );
         let pose = v1::BodyPose {
-            camera_from_body: Some(geometry::rigid_to_wire(
-                &tryon::math::Rigid::<Camera, Camera>::identity(),
-            )),
+            camera_from_body: Some(geometry::rigid_to_wire(&tryon::geometry::math::Rigid::<
+                Camera,
+                Camera,
+            >::identity())),
             angles: bulk::write_flat(&[f64::NAN; 4]),
         };
         assert_eq!(

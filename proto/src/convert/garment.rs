@@ -7,8 +7,8 @@ use std::sync::Arc;
 use tryon::formats::image::{decode_color, encode_jpeg, encode_png_rgb};
 use tryon::formats::{FormatError, PositionCoder};
 use tryon::garment::FabricImage;
-use tryon::math::P3;
-use tryon::mesh::Face;
+use tryon::geometry::math::P3;
+use tryon::geometry::mesh::Face;
 
 const MAX_VERTICES: u32 = 262_144;
 const MAX_FACES: u32 = 524_288;
@@ -287,7 +287,7 @@ impl GarmentReader {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use tryon::camera::ColorImage;
+    use tryon::geometry::camera::ColorImage;
 
     /// Two triangles of two panels that share a seam: four simulated vertices, six drawn ones.
     fn flag() -> WornGarment {

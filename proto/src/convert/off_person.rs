@@ -2,7 +2,7 @@
 
 use crate::v1::{GarmentOffPerson, PartOffPerson};
 use tryon::body::parts::BodyPart;
-use tryon::composite::OffPerson;
+use tryon::view::OffPerson;
 
 /// Wire message of a measurement.
 pub fn off_person_to_wire(off: &OffPerson) -> GarmentOffPerson {

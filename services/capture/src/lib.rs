@@ -2,6 +2,13 @@
 //!
 //! One task owns one camera (`camera`). Its frames are read on a thread of their own (`reader`) while somebody holds a lease
 //! of consent (`consent`), and published on the bus, which keeps only the newest. The rpcs (`service`) start, stop and report.
+//!
+//! # Ideas
+//!
+//! - Consent: leases and their key [`mod@consent`], their renewal `services/kit/src/consent.rs`.
+//! - Consent to record: [`mod@service`].
+//! - Pace of a source: [`mod@pace`].
+#![allow(rustdoc::private_intra_doc_links)] // the index of ideas names private modules
 
 mod camera;
 mod check;

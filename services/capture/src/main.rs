@@ -11,9 +11,9 @@ fn main() -> ExitCode {
     let program = Program {
         name: "capture",
         role: BusRole::Listen,
-        check: tryon_capture::check,
+        check: tryon_capture_service::check,
     };
     process::run(program, Args::parse(), |config, ctx| async move {
-        tryon_capture::start(&config, ctx).await
+        tryon_capture_service::start(&config, ctx).await
     })
 }

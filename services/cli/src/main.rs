@@ -1,4 +1,20 @@
 //! `tryon`: the whole product on the command line.
+//!
+//! # Ideas
+//!
+//! Offline cloth:
+//!
+//! - Commands: [`mod@commands::run_offline`], [`mod@offline_files`].
+//! - By a running service: [`mod@commands::fine`].
+//!
+//! Wire and processes:
+//!
+//! - Supervision of one box: [`mod@onebox`].
+//!
+//! Evidence:
+//!
+//! - Body drawn over its frame: [`mod@overlay`].
+#![allow(rustdoc::private_intra_doc_links)] // the index of ideas names private modules
 #![allow(
     clippy::print_stdout,
     reason = "this is the one program whose standard output is for people and scripts"
@@ -11,6 +27,7 @@ mod input;
 mod interrupt;
 mod offline_files;
 mod onebox;
+mod overlay;
 mod preview;
 mod report;
 mod say;
@@ -50,14 +67,11 @@ fn main() -> ExitCode {
         Command::Simulate(a) => commands::simulate::run(&a),
         Command::Fine(a) => commands::fine::run(&a),
         Command::Composite(a) => commands::composite::run(&a),
-        Command::Ccd(a) => commands::ccd::run(&a),
         Command::Clothcap(a) => commands::clothcap::run(&a),
         Command::Import(a) => commands::import::run(&a),
         Command::Export(a) => commands::export::run(&a),
         Command::Record(a) => commands::record::run(&a),
         Command::Replay(a) => commands::replay::run(&a),
-        Command::TrainParts(a) => commands::train_parts::run(&a),
-        Command::Bench(a) => commands::bench::run(&a),
         Command::Token(a) => commands::token::run(&a),
         Command::Identity(a) => commands::identity::run(&a),
         Command::Doctor(a) => commands::doctor::run(&a),

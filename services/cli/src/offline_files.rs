@@ -5,9 +5,9 @@ use crate::interrupt::Interrupt;
 use anyhow::{Context, Result};
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
+use tryon::cloth::fine::OfflineSolver;
 use tryon::formats::NpyFrames;
-use tryon::math::P3;
-use tryon::offline::OfflineSolver;
+use tryon::geometry::math::P3;
 
 /// Positions of the frames so far, the checkpoint after the last, and the request to end.
 #[derive(Debug)]

@@ -25,25 +25,25 @@ type Start = fn(Arc<Config>, Context) -> Starting;
 /// Name and start of each service, upstream first.
 const SERVICES: [(&str, Start); 4] = [
     ("capture", |c, x| {
-        Box::pin(async move { tryon_capture::start(&c, x).await })
+        Box::pin(async move { tryon_capture_service::start(&c, x).await })
     }),
     ("tracking", |c, x| {
-        Box::pin(async move { tryon_tracking::start(&c, x).await })
+        Box::pin(async move { tryon_tracking_service::start(&c, x).await })
     }),
     ("cloth", |c, x| {
-        Box::pin(async move { tryon_cloth::start(&c, x).await })
+        Box::pin(async move { tryon_cloth_service::start(&c, x).await })
     }),
     ("compositor", |c, x| {
-        Box::pin(async move { tryon_compositor::start(&c, x).await })
+        Box::pin(async move { tryon_compositor_service::start(&c, x).await })
     }),
 ];
 
 /// Check of each service's files.
 const CHECKS: [Check; 4] = [
-    tryon_capture::check,
-    tryon_tracking::check,
-    tryon_cloth::check,
-    tryon_compositor::check,
+    tryon_capture_service::check,
+    tryon_tracking_service::check,
+    tryon_cloth_service::check,
+    tryon_compositor_service::check,
 ];
 
 /// Running services of one box.

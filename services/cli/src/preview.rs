@@ -3,8 +3,8 @@
 use crate::args::RunArgs;
 use crate::input;
 use anyhow::{Context, Result};
-use tryon::camera::RgbdFrame;
 use tryon::formats::{RgbdSource, open_recording};
+use tryon::geometry::camera::RgbdFrame;
 use tryon::mirror::{Mirror, MirrorFrame};
 
 /// Time between the repetitions of a still picture (ns): 30 a second.

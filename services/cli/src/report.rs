@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::fmt::{Display, Formatter};
 use std::path::Path;
-use tryon::composite::OffPerson;
+use tryon::view::OffPerson;
 
 /// Distribution of a measured quantity.
 #[derive(Debug, Clone, Default, Serialize)]

@@ -4,8 +4,8 @@
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
-use tryon::camera::{ColorImage, DepthImage};
 use tryon::formats::image::{write_png_depth, write_png_rgb};
+use tryon::geometry::camera::{ColorImage, DepthImage};
 
 fn tryon(args: &[&str]) -> Output {
     let mut c = Command::new(env!("CARGO_BIN_EXE_tryon"));
@@ -70,7 +70,6 @@ fn each_command_explains_itself() {
         "simulate",
         "fine",
         "composite",
-        "ccd",
         "import",
         "export",
         "record",
@@ -487,29 +486,6 @@ fn a_store_has_one_authority_and_strangers_get_certificates_of_it() {
     assert!(
         refusal.contains("none.pem") && refusal.contains("private key"),
         "{refusal}"
-    );
-}
-
-#[test]
-fn ccd_counts_against_the_truth() {
-    let dir = tempfile::tempdir().unwrap();
-    let root = dir.path().display().to_string();
-    assert!(refused(&["ccd", "--queries", &root]).contains("vertex-face"));
-    let kind = dir.path().join("drop").join("vertex-face");
-    std::fs::create_dir_all(&kind).unwrap();
-    let face = "0,1,0,1,0,1,1\n1,1,0,1,0,1,1\n0,1,0,1,1,1,1\n";
-    let query = format!("1,4,1,1,1,4,1\n{face}1,4,-1,1,1,4,1\n{face}");
-    std::fs::write(kind.join("a.csv"), &query).unwrap();
-    let out = tryon(&["ccd", "--queries", &root, "--json"]);
-    let report: serde_json::Value = serde_json::from_slice(&out.stdout).unwrap();
-    assert_eq!(report["total"]["impacts"], 1);
-    assert_eq!(report["total"]["missed"], 0);
-    assert_eq!(report["sets"][0]["group"], "drop");
-    std::fs::write(kind.join("b.csv"), query.replace("-1,1", "-1,0")).unwrap();
-    let fault = refused(&["ccd", "--queries", &root]);
-    assert!(
-        fault.contains("b.csv") && fault.contains("line 5, y numerator"),
-        "{fault}"
     );
 }
 

@@ -4,9 +4,9 @@
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
-use tryon::evaluate::scans::{ScanScene, write_scan_folder};
 use tryon::formats::RgbdFolderWriter;
 use tryon::synth::{Actor, Routine, Sequence, Setting};
+use tryon_bench::scans::{ScanScene, write_scan_folder};
 
 fn clothcap(args: &[&str]) -> Output {
     let mut c = Command::new(env!("CARGO_BIN_EXE_tryon"));

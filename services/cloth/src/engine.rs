@@ -7,7 +7,7 @@ use tryon::body::measure::{Measurements, measure};
 use tryon::body::{BodyShape, Pose, RestBody, Template};
 use tryon::cloth::StepReport;
 use tryon::dressing::{self, FitProbe, Suggestion};
-use tryon::math::{Camera, Rigid, World};
+use tryon::geometry::math::{Camera, Rigid, World};
 use tryon::mirror::{
     Choice, DressedOutfit, FrameClock, LongGap, PosedBody, PutOn, SizedGarment, Subject,
 };

@@ -8,10 +8,10 @@ use std::sync::Arc;
 use tokio::sync::watch;
 use tonic::Status;
 use tryon::body::Template;
-use tryon::math::V3d;
+use tryon::cloth::fine::{DrapeReport, FrameTargets};
+use tryon::geometry::math::V3d;
+use tryon::geometry::par::Par;
 use tryon::mirror::{DressedOutfit, FrameClock, LongGap, MirrorError, OfflineOutfit};
-use tryon::offline::{DrapeReport, FrameTargets};
-use tryon::par::Par;
 use tryon_proto::convert::WireError;
 use tryon_proto::convert::garment::{WornGarment, topology_to_wire};
 use tryon_proto::v1::{
@@ -258,8 +258,7 @@ pub(crate) mod tests {
     use tonic::Code;
     use tryon::body::measure::measure;
     use tryon::body::{BodyShape, Pose, embedded};
-    use tryon::evaluate::rest::lower_arms;
-    use tryon::math::{Body, Rigid, World};
+    use tryon::geometry::math::{Body, Rigid, World};
     use tryon::mirror::{Choice, PutOn, Subject};
 
     /// A garment on the mean body, of which nothing is recorded and which is forgotten.
@@ -268,7 +267,7 @@ pub(crate) mod tests {
         let rest = template.personalise(&BodyShape::default());
         let mut pose: Pose<World> =
             Pose::rest(template.skeleton(), Rigid::<World, Body>::identity());
-        lower_arms(&template, &rest, 0.9, &mut pose);
+        pose.lower_arms(template.skeleton(), &rest, 0.9);
         let subject = Subject {
             template: &template,
             rest: &rest,

@@ -2,6 +2,15 @@
 //!
 //! One task owns one session (`session`): it follows the body states, dresses the body when it is calibrated, steps the
 //! garments on the compute pool and sends each reader a keyframe and then positions.
+//!
+//! # Ideas
+//!
+//! - Keyframe for which reader: [`mod@session`].
+//! - Garments on offer: [`mod@library`], those of a folder: [`mod@folder`].
+//! - Less detail on a slow machine: [`mod@detail_ladder`].
+//! - Simulations on request: [`mod@simulation`], of scenes: [`mod@scene_task`], of a session's garments on finer
+//!   meshes: [`mod@fine_task`], [`mod@recording`].
+#![allow(rustdoc::private_intra_doc_links)] // the index of ideas names private modules
 
 mod chosen_sizes;
 mod detail_ladder;

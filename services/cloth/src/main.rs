@@ -11,9 +11,9 @@ fn main() -> ExitCode {
     let program = Program {
         name: "cloth",
         role: BusRole::Apart,
-        check: tryon_cloth::check,
+        check: tryon_cloth_service::check,
     };
     process::run(program, Args::parse(), |config, ctx| async move {
-        tryon_cloth::start(&config, ctx).await
+        tryon_cloth_service::start(&config, ctx).await
     })
 }

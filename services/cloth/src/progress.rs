@@ -7,7 +7,7 @@ use std::sync::Arc;
 use std::time::Instant;
 use tokio::sync::watch;
 use tonic::Status;
-use tryon::math::P3;
+use tryon::geometry::math::P3;
 use tryon_proto::v1::{DrapeStep, FollowSimulationResponse, FrameId};
 
 /// Frame stream of one reader.

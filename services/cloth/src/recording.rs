@@ -1,7 +1,7 @@
 //! Recording of a session's body from one exposure on, for a simulation that follows it at a pace of its own.
 
 use tokio::sync::mpsc;
-use tryon::math::P3;
+use tryon::geometry::math::P3;
 use tryon_proto::v1::FrameId;
 
 /// Longest recording (s); as the contract says.

@@ -5,9 +5,9 @@ use bytes::Bytes;
 use std::ops::ControlFlow;
 use std::path::Path;
 use tonic::Status;
+use tryon::cloth::fine::{OfflineScene, OfflineSettings, checkpoint_frame};
 use tryon::cloth::scene::{self, RunConfig, Scene};
-use tryon::offline::{OfflineScene, OfflineSettings, checkpoint_frame};
-use tryon::par::Par;
+use tryon::geometry::par::Par;
 use tryon_proto::convert::WireError;
 use tryon_proto::v1::{ClothSolver, StartSimulationRequest};
 

@@ -307,7 +307,7 @@ mod tests {
     use futures::StreamExt;
     use std::error::Error;
     use tonic::Code;
-    use tryon::math::{P3, V3};
+    use tryon::geometry::math::{P3, V3};
     use tryon::mirror::PutOn;
     use tryon_proto::v1::FrameId;
 

@@ -2,9 +2,9 @@
 
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
-use tryon::camera::ColorImage;
-use tryon::composite::{Input, Model, RenderError, RenderReport, State, Workspace, render};
-use tryon::gpu::{GpuError, Prefer, Renderer, choose};
+use tryon::geometry::camera::ColorImage;
+use tryon::view::gpu::{GpuError, Prefer, Renderer, choose};
+use tryon::view::{Input, Model, RenderError, RenderReport, State, Workspace, render};
 use tryon_kit::config::RendererChoice;
 
 /// Renderer of all pictures. Clones share the card; the last one dropped waits for the end of the search.

@@ -2,7 +2,7 @@
 //! often than it is exposed.
 
 use tokio::time::{Duration, Instant};
-use tryon::camera::ColorImage;
+use tryon::geometry::camera::ColorImage;
 
 /// Pixels between two samples, in both directions: a hand at two metres covers some twenty.
 const STRIDE: usize = 8;

@@ -7,16 +7,16 @@ use crate::off_person::NewestOffPerson;
 use std::path::Path;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
-use tryon::camera::ColorImage;
-use tryon::composite::{
-    Appearance, Config, Framing, ImagePyramid, Input, Model, OffPerson, Print, RenderReport, State,
-    Workspace,
-};
 use tryon::dressing::FIT_COLORS;
 use tryon::formats::image::{encode_jpeg, encode_png_rgb};
-use tryon::math::{Camera, Rigid, World};
+use tryon::geometry::camera::ColorImage;
+use tryon::geometry::math::{Camera, Rigid, World};
 use tryon::mirror::{
     CameraGarments, DrawnBody, DrawnSurface, FollowedBody, FrameClock, LongGap, PosedBody,
+};
+use tryon::view::{
+    Appearance, Config, Framing, ImagePyramid, Input, Model, OffPerson, Print, RenderReport, State,
+    Workspace,
 };
 use tryon_kit::frames::{Exposure, stage};
 use tryon_kit::telemetry::record_skipped;

@@ -371,7 +371,7 @@ fn end(s: &Status) -> Failure {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use tryon::camera::{Calibration, DepthImage, Intrinsics, RgbdFrame};
+    use tryon::geometry::camera::{Calibration, DepthImage, Intrinsics, RgbdFrame};
     use tryon_kit::frames::Exposure;
 
     fn exposure(sequence: u64) -> Arc<Exposure> {

@@ -4,6 +4,19 @@
 //! and sequence (`join_buffer`). It renders on the compute pool (`engine`, on a `card` where there is one), queues pictures
 //! for every viewer (`viewer`), draws fine pictures on request (`fine_picture`) and keeps photos for phones (`photos`). The states of a try-on are the table of `tryon::session`. gRPC, gRPC-web and the page
 //! share one port.
+//!
+//! # Ideas
+//!
+//! - Frames that wait for their garments: [`mod@join_buffer`].
+//! - Card shared and lost: [`mod@card`].
+//! - Viewers and their acknowledgements: [`mod@viewer`].
+//! - Formats to draw: [`mod@formats`].
+//! - Admission: [`mod@admission`].
+//! - Empty rooms: [`mod@empty_scene`].
+//! - Photos for phones: [`mod@photos`].
+//! - Fine pictures: [`mod@fine_picture`].
+//! - The task of one try-on: [`mod@try_on::task`].
+#![allow(rustdoc::private_intra_doc_links)] // the index of ideas names private modules
 
 mod admission;
 mod card;

@@ -11,9 +11,9 @@ fn main() -> ExitCode {
     let program = Program {
         name: "compositor",
         role: BusRole::Connect,
-        check: tryon_compositor::check,
+        check: tryon_compositor_service::check,
     };
     process::run(program, Args::parse(), |config, ctx| async move {
-        tryon_compositor::start(&config, ctx).await
+        tryon_compositor_service::start(&config, ctx).await
     })
 }

@@ -1,6 +1,6 @@
 //! Garments off the person: the newest measurement of an outfit, its metrics, its place in pictures.
 
-use tryon::composite::OffPerson;
+use tryon::view::OffPerson;
 use tryon_proto::convert::off_person::off_person_to_wire;
 use tryon_proto::v1::{DegradedReason, Picture};
 

@@ -324,7 +324,11 @@ mod tests {
     #[test]
     fn log_filters_are_levels_and_modules_with_levels() {
         let check = |level: &str| Config::load(None, &[format!("log.level=\"{level}\"")]);
-        for good in ["info", "OFF", "warn,tryon_cloth::engine=trace,a-b=off"] {
+        for good in [
+            "info",
+            "OFF",
+            "warn,tryon_cloth_service::engine=trace,a-b=off",
+        ] {
             assert!(check(good).is_ok(), "{good}");
         }
         for bad in [

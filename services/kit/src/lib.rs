@@ -1,5 +1,31 @@
 //! Parts that every process shares: configuration, logs and metrics, the bus, queues with a policy, the compute pool,
 //! servers, reconnecting clients, and a shutdown with a deadline.
+//!
+//! # Ideas
+//!
+//! - Never dropped: [`mod@queue::ordered`].
+//! - Newest frame wins: [`mod@queue::latest`].
+//! - Bus: [`mod@bus`].
+//! - Order: [`mod@frame_order`].
+//! - Stalls: [`mod@flow`].
+//! - Traces of frames: [`mod@frame_trace`].
+//! - Systemd's notifications: [`mod@supervisor`].
+//! - Reconnection: [`mod@client`].
+//! - Server limits: [`mod@server`].
+//! - HTTP: [`mod@transport`], [`mod@connections`].
+//! - TLS: [`mod@tls`].
+//! - Identity of services: [`mod@identity`].
+//! - Pace of readers: [`mod@queue::pace`].
+//! - Who may call: [`mod@auth`], its gate `gate.rs`.
+//! - Shutdown with a deadline: [`mod@drain`].
+//! - Configuration: [`mod@config`].
+//! - Metrics, logs: [`mod@telemetry`], [`mod@admin`], [`mod@log_fields`].
+//! - No core dumps: [`mod@core_dump`].
+//! - Computation off async workers: [`mod@compute`].
+//! - A body that outlives restarts: [`mod@remembered_body`].
+//! - Sealed frames: [`mod@seal`].
+//! - Zeroed memory: [`mod@forget`].
+#![allow(rustdoc::private_intra_doc_links)] // the index of ideas names private modules
 
 pub mod admin;
 pub mod auth;

@@ -4,8 +4,8 @@ use std::path::Path;
 use std::sync::{Arc, OnceLock};
 use std::time::Instant;
 use tryon::body::{BodyShape, Template, embedded, import};
-use tryon::camera::{Calibration, Intrinsics};
 use tryon::formats::npz;
+use tryon::geometry::camera::{Calibration, Intrinsics};
 use tryon::tracking::{
     KnownBody, LostReason, Status, TrackerConfig, TrackerModel, TrackerState, Workspace,
     adapt_surface, follow,

@@ -11,9 +11,9 @@ fn main() -> ExitCode {
     let program = Program {
         name: "tracking",
         role: BusRole::Connect,
-        check: tryon_tracking::check,
+        check: tryon_tracking_service::check,
     };
     process::run(program, Args::parse(), |config, ctx| async move {
-        tryon_tracking::start(&config, ctx).await
+        tryon_tracking_service::start(&config, ctx).await
     })
 }

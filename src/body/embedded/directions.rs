@@ -7,12 +7,12 @@
 use super::field::Field;
 use super::figure::{Figure, Joints};
 use super::{carve, rig, statistics as stat};
-use crate::body::measure::{Measurements, measure};
-use crate::body::parts::BodySegment;
-use crate::body::{BodyError, BodyShape, ShapeSpace, Skeleton, SkinWeights, Template};
-use crate::math::{P3d, V3d};
-use crate::mesh::smoothing::smoothed;
-use crate::par::{self, Par};
+use crate::measure::{Measurements, measure};
+use crate::parts::BodySegment;
+use crate::{BodyError, BodyShape, ShapeSpace, Skeleton, SkinWeights, Template};
+use tryon_geometry::math::{P3d, V3d};
+use tryon_geometry::mesh::smoothing::smoothed;
+use tryon_geometry::par::{self, Par};
 
 /// Names of the directions, in order; `sex` +1 is the mean man, −1 the mean woman.
 pub const DIRECTIONS: [&str; 9] = [

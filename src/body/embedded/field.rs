@@ -2,7 +2,7 @@
 //!
 //! Only + − × ÷ and √ are used: the surface has the same bits on every machine.
 
-use crate::math::{P3d, V3d};
+use tryon_geometry::math::{P3d, V3d};
 
 /// Numbers of a station: centre (u, w), radii (+u, −u, +w, −w), squareness (0 ellipse, 1 superellipse of order 4).
 const CHANNELS: usize = 7;

@@ -1,6 +1,6 @@
 //! Proportions of the figure by shape parameters, and its joints.
 
-use crate::math::P3d;
+use tryon_geometry::math::P3d;
 
 /// Shape of the figure at the mean stature, standard deviations from the mean of both sexes.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

@@ -2,7 +2,7 @@
 
 use super::field::{Field, FieldPrimitive, Frame, Loft, Station};
 use super::figure::Figure;
-use crate::math::{P3d, V3d};
+use tryon_geometry::math::{P3d, V3d};
 
 /// Sections of the face: height, half width, front, back (metres), squareness, half width per unit of sex (metres).
 const FACE: [[f64; 6]; 10] = [

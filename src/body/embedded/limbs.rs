@@ -2,7 +2,7 @@
 
 use super::field::{Field, FieldPrimitive, Frame, Loft, Station};
 use super::figure::{Figure, Joints};
-use crate::math::{P3d, V3d};
+use tryon_geometry::math::{P3d, V3d};
 
 /// Shape of one limb segment.
 struct Segment<const N: usize> {

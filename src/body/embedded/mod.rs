@@ -15,11 +15,11 @@ pub mod statistics;
 mod torso;
 
 use super::{BodyError, Skeleton, Template};
-use crate::math::{P3, P3d};
-use crate::mesh::{Border, Face, RemeshSpec, Remesher, Topology, TriMesh};
 use field::Field;
 use figure::{Figure, Joints, STATURE};
 use std::sync::{Arc, OnceLock};
+use tryon_geometry::math::{P3, P3d};
+use tryon_geometry::mesh::{Border, Face, RemeshSpec, Remesher, Topology, TriMesh};
 
 pub use directions::{DIRECTIONS, RANGE};
 

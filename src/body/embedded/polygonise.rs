@@ -1,10 +1,10 @@
 //! Marching tetrahedra over the cells that the surface can pass, left half only; always a manifold.
 
 use super::field::Field;
-use crate::math::P3d;
-use crate::mesh::Face;
-use crate::par::{self, Par};
 use std::collections::BTreeMap;
+use tryon_geometry::math::P3d;
+use tryon_geometry::mesh::Face;
+use tryon_geometry::par::{self, Par};
 
 /// Grid spacing, metres: three cells across a finger.
 const CELL: f64 = 0.0065;

@@ -1,11 +1,11 @@
 //! The skeleton of the figure and its skinning weights.
 
 use super::figure::Joints;
-use crate::body::{BodyError, Joint, JointMotion, Skeleton, SkinWeights};
-use crate::math::{P3d, V3d};
-use crate::mesh::Topology;
-use crate::mesh::smoothing::smoothed;
-use crate::par::{self, Par};
+use crate::{BodyError, Joint, JointMotion, Skeleton, SkinWeights};
+use tryon_geometry::math::{P3d, V3d};
+use tryon_geometry::mesh::Topology;
+use tryon_geometry::mesh::smoothing::smoothed;
+use tryon_geometry::par::{self, Par};
 
 /// Mirror image at x = 0.
 fn mirrored(p: P3d) -> P3d {

@@ -2,11 +2,11 @@
 
 use super::statistics as stat;
 use super::*;
-use crate::body::measure::{Measurements, measure};
-use crate::body::{BodyShape, BoneTransforms, JointMotion, Pose, skin};
-use crate::math::{Body, Rigid};
-use crate::mesh::{face_normal, smallest_angle};
-use crate::par::{Par, with_threads};
+use crate::measure::{Measurements, measure};
+use crate::{BodyShape, BoneTransforms, JointMotion, Pose, skin};
+use tryon_geometry::math::{Body, Rigid};
+use tryon_geometry::mesh::{face_normal, smallest_angle};
+use tryon_geometry::par::{Par, with_threads};
 
 fn shape(direction: usize, c: f64) -> BodyShape {
     let mut coefficients = vec![0.0; DIRECTIONS.len()];

@@ -2,7 +2,7 @@
 
 use super::field::{Field, FieldPrimitive, Frame, Loft, Station};
 use super::figure::{Figure, Joints};
-use crate::math::{P3d, V3d};
+use tryon_geometry::math::{P3d, V3d};
 
 /// Outline of the trunk, metres: height, half width, front, back, squareness; then what one unit of sex (+ male)
 /// and of girth add to half width, front and back.

@@ -1,9 +1,9 @@
 //! Plane sections of a surface: closed outlines, their girth as a tape measures it, and rays through it.
 
-use crate::math::{P3, P3d, V3d};
-use crate::mesh::Face;
 use nalgebra::Point2;
 use std::collections::BTreeMap;
+use tryon_geometry::math::{P3, P3d, V3d};
+use tryon_geometry::mesh::Face;
 
 /// Closed outlines of the surface in a plane, in coordinates (u, v) of the plane around its `origin`.
 #[derive(Clone, Debug)]

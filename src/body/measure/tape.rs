@@ -1,10 +1,10 @@
 //! Girths around a body and lengths between its joints.
 
 use super::section::{LevelSlabs, SLICE, Section, first_exit, section};
-use crate::body::{RestBody, Template};
-use crate::math::{P3d, V3d};
+use crate::{RestBody, Template};
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
+use tryon_geometry::math::{P3d, V3d};
 
 /// Sizes of a person in the rest pose, metres.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]

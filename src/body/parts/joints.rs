@@ -1,6 +1,6 @@
 //! Segments, sides, parts and limbs of the joints: the only reader of joint names.
 
-use crate::body::Skeleton;
+use crate::Skeleton;
 
 /// Side of the subject.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -252,7 +252,7 @@ impl BodyParts {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::body::{Joint, JointMotion};
+    use crate::{Joint, JointMotion};
 
     fn parts(joints: &[(&str, Option<usize>)]) -> BodyParts {
         let joint = |(name, parent): &(&str, Option<usize>)| Joint {

@@ -1,8 +1,8 @@
 //! Upright frame and elliptic sections of the trunk.
 
 use super::BodyPart;
-use crate::body::Template;
-use crate::math::{P3, P3d, V3d};
+use crate::Template;
+use tryon_geometry::math::{P3, P3d, V3d};
 
 /// Half axis of an ellipse over the standard deviation of points on it.
 const HALF_AXIS: f64 = std::f64::consts::SQRT_2;

@@ -1,8 +1,8 @@
 //! Parts of the vertices of a body, as bit masks.
 
 use super::{BodyPart, BodySegment};
-use crate::body::{Joint, Template};
-use crate::math::{P3, P3d, V3};
+use crate::{Joint, Template};
+use tryon_geometry::math::{P3, P3d, V3};
 
 /// A connected component with at most this share of a body's vertices is no skin (mannequin: pegs 0.04 %, hands 3.8 %).
 const SMALLEST_COMPONENT: f64 = 1e-3;
@@ -102,8 +102,8 @@ pub fn hinge_vertices(template: &Template) -> Vec<[Vec<u32>; 2]> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::body::embedded;
-    use crate::body::parts::BodyPart;
+    use crate::embedded;
+    use crate::parts::BodyPart;
 
     #[test]
     fn the_embedded_body_has_four_limbs_that_mirror_each_other() {

@@ -1,9 +1,47 @@
-//! Contact generation for worn garments: against the body, other layers and their own folds.
+//! The collision body of a pose: filtered, parts and joints separated; its closest points, inside tests and virtual depth maps. Contact pairs: broad phase, continuous collision detection, distances, barrier, friction.
+//!
+//! The body is built once a pose: cloth collides with it, dressing drapes on it, the compositor draws it. Nothing here steps time.
 
-pub(super) mod anchor;
-pub(super) mod body_contact;
-pub(super) mod chunk;
-pub(super) mod cloth_contact;
-pub(super) mod layer_height;
-pub(crate) mod self_contact;
-pub(super) mod skin_projection;
+mod body_filter;
+pub mod broad_phase;
+pub mod ccd;
+mod closest_multistart;
+mod closest_point;
+mod collision_body;
+mod contact_mesh;
+mod depth_maps;
+mod distance;
+mod edge_triangle;
+mod interior;
+mod joint_clearance;
+mod pair;
+mod part_clearance;
+mod potential;
+mod proximity_cache;
+mod skin_grid;
+mod surface;
+#[cfg(test)]
+mod test_shapes;
+mod triangle_fan;
+
+pub use closest_point::{ClosestPoint, SearchExtent};
+pub use collision_body::{
+    CollisionBody, CollisionConfig, CollisionError, CollisionModel, CollisionParts,
+    CollisionReport, CollisionWorkspace,
+};
+pub use contact_mesh::{ContactMesh, ContactMeshError, ContactSurface};
+pub use depth_maps::{DepthMaps, MapDetail, MapView};
+pub use distance::{
+    ClosestFeatures, ParallelMollifier, Separation, Slide, edge_edge, mollifier_threshold,
+    point_edge, point_point, point_triangle,
+};
+#[cfg(test)]
+pub(crate) use edge_triangle::edge_meets_triangle;
+pub use interior::Interior;
+pub use pair::{ActivePair, ContactPair};
+pub use potential::{
+    Barrier, BarrierSample, BarrierScale, ContactAssembly, ContactElement, Curvature, Friction,
+    FrictionPair,
+};
+pub use skin_grid::{SkinCandidates, SkinGrid};
+pub use surface::{Part, SurfaceFrame, SurfaceModel};

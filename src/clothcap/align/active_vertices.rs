@@ -1,10 +1,10 @@
 //! Vertices that an iteration solves: those that moved in the last one, their neighbours, and of both what points show.
 
 use super::quadratic::QuadraticEnergy;
-use crate::clothcap::CaptureError;
-use crate::math::P3;
-use crate::mesh::{Csr, Face};
+use crate::CaptureError;
 use serde::{Deserialize, Serialize};
+use tryon_geometry::math::P3;
+use tryon_geometry::mesh::{Csr, Face};
 
 /// Share of the vertices up to which they are solved apart. More are solved faster with all others, by factorisation.
 const SOME: f64 = 0.5;
@@ -30,7 +30,7 @@ impl std::ops::AddAssign for VertexCounts {
 
 /// State of each vertex of a fit.
 #[derive(Debug)]
-pub(in crate::clothcap) struct ActiveVertices<'a> {
+pub(crate) struct ActiveVertices<'a> {
     neighbours: &'a Csr,
     /// Motion in an iteration up to which a vertex counts as settled, metres; 0 solves all in each.
     settled: f32,
@@ -45,7 +45,7 @@ pub(in crate::clothcap) struct ActiveVertices<'a> {
 impl<'a> ActiveVertices<'a> {
     /// All vertices active; `neighbours` are those along the edges, `settled` is the motion in an iteration up to which a
     /// vertex is held, metres; 0 solves all in each.
-    pub(in crate::clothcap) fn new(neighbours: &'a Csr, settled: f32) -> Self {
+    pub(crate) fn new(neighbours: &'a Csr, settled: f32) -> Self {
         let n = neighbours.rows();
         Self {
             neighbours,
@@ -58,12 +58,12 @@ impl<'a> ActiveVertices<'a> {
     }
 
     /// Begins a stage of other weights: all are active.
-    pub(in crate::clothcap) fn begin(&mut self) {
+    pub(crate) fn begin(&mut self) {
         self.is_active.fill(true);
     }
 
     /// Takes the vertices that are pulled at in this iteration: corners of faces with points, and `others`.
-    pub(in crate::clothcap) fn see(
+    pub(crate) fn see(
         &mut self,
         faces: impl Iterator<Item = Face>,
         others: impl Iterator<Item = u32>,
@@ -77,7 +77,7 @@ impl<'a> ActiveVertices<'a> {
     ///
     /// # Errors
     /// [`CaptureError::Solve`].
-    pub(in crate::clothcap) fn solve(
+    pub(crate) fn solve(
         &mut self,
         energy: &mut QuadraticEnergy,
         x: &mut Vec<P3>,
@@ -106,7 +106,7 @@ impl<'a> ActiveVertices<'a> {
     ///
     /// # Errors
     /// [`CaptureError::Solve`].
-    pub(in crate::clothcap) fn finish(
+    pub(crate) fn finish(
         &mut self,
         energy: &mut QuadraticEnergy,
         x: &mut Vec<P3>,
@@ -130,7 +130,7 @@ impl<'a> ActiveVertices<'a> {
     }
 
     /// Vertices so far.
-    pub(in crate::clothcap) fn counts(&self) -> VertexCounts {
+    pub(crate) fn counts(&self) -> VertexCounts {
         self.counts
     }
 

@@ -7,15 +7,15 @@ use super::free_surface::{FreeSurface, SurfaceFitConfig, SurfaceMatch};
 use super::legs::leg_topology;
 use super::model_fit::{AlignedBody, FitStage, ModelFit};
 use super::start::{Start, find_person};
-use crate::body::{BoneTransforms, Pose, Template};
-use crate::clothcap::scan::BodyScan;
-use crate::clothcap::topology::{ClothTemplate, LegTopology};
-use crate::clothcap::{CaptureError, unpose_shaped};
-use crate::math::{P3, Rigid, World};
+use crate::scan::BodyScan;
+use crate::topology::{ClothTemplate, LegTopology};
+use crate::{CaptureError, unpose_shaped};
 use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
 use std::f64::consts::{FRAC_PI_2, PI};
 use std::sync::Arc;
+use tryon_body::{BoneTransforms, Pose, Template};
+use tryon_geometry::math::{P3, Rigid, World};
 
 /// BodyScan points in a fit of the model.
 const SAMPLES: usize = 6000;
@@ -170,7 +170,7 @@ impl Aligner {
     }
 
     /// Starts the next scan in the pose of a body.
-    pub(in crate::clothcap) fn follow(&mut self, body: &AlignedBody) {
+    pub(crate) fn follow(&mut self, body: &AlignedBody) {
         self.last = Some(body.clone());
     }
 

@@ -1,7 +1,7 @@
 //! Priors of joint angles: near the start, and spine, neck and head straight.
 
-use crate::body::Template;
-use crate::body::parts::BodySegment;
+use tryon_body::Template;
+use tryon_body::parts::BodySegment;
 
 /// Standard deviations of joint angles from those of the start, radians: of joints of the spine, collars, hands and feet,
 /// and of the others.

@@ -1,16 +1,16 @@
 //! Arms that a fit has lost: where the scan shows an arm that the body does not explain, they are searched anew.
 
 use super::model_fit::{AlignedBody, FitStage, ModelFit};
-use crate::body::parts::BodyPart;
-use crate::body::{BoneTransforms, RestBody, Template};
-use crate::clothcap::CaptureError;
-use crate::clothcap::scan::BodyScan;
-use crate::clothcap::unpose::blended;
-use crate::math::P3;
-use crate::spatial::PointTree;
+use crate::CaptureError;
+use crate::scan::BodyScan;
+use crate::unpose::blended;
 use rand::{Rng, SeedableRng};
 use rand_distr::StandardNormal;
 use rand_pcg::Pcg32;
+use tryon_body::parts::BodyPart;
+use tryon_body::{BoneTransforms, RestBody, Template};
+use tryon_geometry::math::P3;
+use tryon_geometry::spatial::PointTree;
 
 /// Most scan points that arms are compared with.
 const POINTS: usize = 3000;

@@ -1,9 +1,9 @@
 //! Normal equations of pose and shape: damped, with priors, and with the pose eliminated.
 
 use super::shape_unknowns::ShapeUnknowns;
-use crate::body::BodyShape;
-use crate::clothcap::CaptureError;
+use crate::CaptureError;
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
+use tryon_body::BodyShape;
 
 /// Share of its diagonal added to the normal matrix.
 const DAMPING: f64 = 1e-3;

@@ -2,11 +2,11 @@
 
 use super::face_walk::QuerySurface;
 use super::pairing::ScanNormal;
-use crate::math::{P3, V3};
-use crate::mesh::Face;
-use crate::par::{self, Par};
-use crate::spatial::SurfacePoint;
 use serde::{Deserialize, Serialize};
+use tryon_geometry::math::{P3, V3};
+use tryon_geometry::mesh::Face;
+use tryon_geometry::par::{self, Par};
+use tryon_geometry::spatial::SurfacePoint;
 
 /// Counts of nearest-point queries of a fit.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -37,17 +37,17 @@ struct KeptFace {
 
 /// Points of a scan that look for a surface.
 #[derive(Clone, Copy, Debug)]
-pub(in crate::clothcap) struct QueryPoints<'a> {
+pub(crate) struct QueryPoints<'a> {
     /// All of them, metres.
-    pub(in crate::clothcap) points: &'a [P3],
+    pub(crate) points: &'a [P3],
     /// Their normals, see [`ScanNormal::normal`].
-    pub(in crate::clothcap) normals: &'a [V3],
+    pub(crate) normals: &'a [V3],
     /// See [`ScanNormal::oriented`].
-    pub(in crate::clothcap) oriented: bool,
+    pub(crate) oriented: bool,
     /// Every so manieth takes part; at least 1.
-    pub(in crate::clothcap) stride: usize,
+    pub(crate) stride: usize,
     /// Points that take no part, shape `[points]`, or empty.
-    pub(in crate::clothcap) left_out: &'a [bool],
+    pub(crate) left_out: &'a [bool],
 }
 
 impl QueryPoints<'_> {
@@ -61,7 +61,7 @@ impl QueryPoints<'_> {
 
 /// Faces of the points of one fit.
 #[derive(Debug)]
-pub(in crate::clothcap) struct FaceCache {
+pub(crate) struct FaceCache {
     /// Motion of a face since it was found up to which it is kept, metres; 0 keeps none.
     settled: f32,
     /// Searches start at the last face: of two faces equally near, another one may be found.
@@ -77,7 +77,7 @@ pub(in crate::clothcap) struct FaceCache {
 impl FaceCache {
     /// Cache of a fit to so many points; `settled` is the motion up to which a face is kept, metres; at 0 each search is
     /// made from nothing.
-    pub(in crate::clothcap) fn new(points: usize, settled: f32) -> Self {
+    pub(crate) fn new(points: usize, settled: f32) -> Self {
         Self {
             settled,
             starts: settled > 0.0,
@@ -89,12 +89,12 @@ impl FaceCache {
     }
 
     /// Keeps no face from now on: every point is searched, from the face that it had.
-    pub(in crate::clothcap) fn search_all(&mut self) {
+    pub(crate) fn search_all(&mut self) {
         self.settled = 0.0;
     }
 
     /// Starts the first search of point `i` at a face.
-    pub(in crate::clothcap) fn start_at(&mut self, i: usize, face: u32) {
+    pub(crate) fn start_at(&mut self, i: usize, face: u32) {
         // As if it had moved a long way since.
         let travel = f32::NEG_INFINITY;
         self.kept[i] = Some(KeptFace { face, travel });
@@ -102,7 +102,7 @@ impl FaceCache {
 
     /// Starts the first searches of points at the face of the last point before them that was searched, in an order in which
     /// neighbours are near.
-    pub(in crate::clothcap) fn spread(&mut self, order: &[u32]) {
+    pub(crate) fn spread(&mut self, order: &[u32]) {
         let mut last = None;
         for i in order.iter().map(|i| *i as usize) {
             match (self.kept[i].filter(|k| k.travel.is_finite()), last) {
@@ -114,7 +114,7 @@ impl FaceCache {
     }
 
     /// Measures the motion of the faces since the last call.
-    pub(in crate::clothcap) fn advance(&mut self, faces: &[Face], surface: &[P3]) {
+    pub(crate) fn advance(&mut self, faces: &[Face], surface: &[P3]) {
         self.travel.resize(faces.len(), 0.0);
         if self.last.len() == surface.len() {
             let moved: Vec<f32> = surface
@@ -132,7 +132,7 @@ impl FaceCache {
     }
 
     /// Points of the surface closest to every `stride`-th point, with the point's index and normal; each is kept.
-    pub(in crate::clothcap) fn closest_each(
+    pub(crate) fn closest_each(
         &mut self,
         surface: &QuerySurface<'_>,
         points: &QueryPoints<'_>,
@@ -207,7 +207,7 @@ impl FaceCache {
     }
 
     /// Queries so far.
-    pub(in crate::clothcap) fn counts(&self) -> QueryCounts {
+    pub(crate) fn counts(&self) -> QueryCounts {
         self.counts
     }
 }

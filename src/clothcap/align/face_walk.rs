@@ -1,9 +1,9 @@
 //! Closest points by descent over neighbouring faces: on a surface that is near, a few triangles instead of a tree.
 
 use super::pairing::{ScanNormal, facing};
-use crate::math::{P3, V3};
-use crate::mesh::{Csr, face_normal};
-use crate::spatial::{Bvh, SurfacePoint};
+use tryon_geometry::math::{P3, V3};
+use tryon_geometry::mesh::{Csr, face_normal};
+use tryon_geometry::spatial::{Bvh, SurfacePoint};
 
 /// Largest distance at which a descent counts, metres: an end of it that is not the closest point of all, across a gap
 /// between two sheets that face the same way, is wrong by less.
@@ -13,13 +13,13 @@ const STEPS: usize = 16;
 
 /// Surface that closest points are searched on.
 #[derive(Clone, Copy, Debug)]
-pub(in crate::clothcap) struct QuerySurface<'a> {
+pub(crate) struct QuerySurface<'a> {
     /// Tree of its faces, fitted to the vertices.
-    pub(in crate::clothcap) tree: &'a Bvh,
+    pub(crate) tree: &'a Bvh,
     /// Vertices, metres.
-    pub(in crate::clothcap) vertices: &'a [P3],
+    pub(crate) vertices: &'a [P3],
     /// Faces around each vertex.
-    pub(in crate::clothcap) around: &'a Csr,
+    pub(crate) around: &'a Csr,
 }
 
 impl QuerySurface<'_> {
@@ -84,9 +84,9 @@ impl QuerySurface<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::body::embedded;
-    use crate::mesh::vertex_normals;
-    use crate::par::Par;
+    use tryon_body::embedded;
+    use tryon_geometry::mesh::vertex_normals;
+    use tryon_geometry::par::Par;
 
     /// Points over the surface of a body: a descent from a face two rings away ends at the closest point of all or, between
     /// sheets, no farther than its reach beyond it; most end there exactly.

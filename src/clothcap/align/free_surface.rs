@@ -6,15 +6,15 @@ use super::face_walk::QuerySurface;
 use super::model_fit::is_bare;
 use super::pairing::ScanNormal;
 use super::quadratic::{EVEN_EDGE, QuadraticEnergy, Stencil};
-use crate::body::Template;
-use crate::clothcap::CaptureError;
-use crate::clothcap::scan::BodyScan;
-use crate::math::{P3, V3};
-use crate::mesh::{Csr, Face, vertex_normals};
-use crate::par::Par;
-use crate::registration::GemanMcClure;
-use crate::spatial::{Bvh, SurfacePoint};
+use crate::CaptureError;
+use crate::scan::BodyScan;
 use std::sync::Arc;
+use tryon_body::Template;
+use tryon_geometry::math::{P3, V3};
+use tryon_geometry::mesh::{Csr, Face, vertex_normals};
+use tryon_geometry::par::Par;
+use tryon_geometry::spatial::{Bvh, SurfacePoint};
+use tryon_tracking::registration::GemanMcClure;
 
 /// Coupling of hands, feet and head beside 1 elsewhere (w of eq. 5): scans are noisy there and no cloth covers them.
 const FIRM: f64 = 8.0;
@@ -27,11 +27,11 @@ const CONVERGED: f32 = 5e-5;
 
 /// Motion of a face up to which points keep it, metres: closest points change by less than by noise. At 1 mm hems of
 /// low contrast are 1 mm worse.
-pub(in crate::clothcap) const SETTLED: f32 = 5e-4;
+pub(crate) const SETTLED: f32 = 5e-4;
 
 /// Motion of a vertex in an iteration up to which it is held in the next, metres: what it would still move is a
 /// fraction of that.
-pub(in crate::clothcap) const STILL: f32 = 1e-4;
+pub(crate) const STILL: f32 = 1e-4;
 
 /// Name of the solve in faults.
 const STAGE: &str = "free surface";

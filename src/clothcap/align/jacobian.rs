@@ -1,11 +1,11 @@
 //! Normal equations of matched scan points in pose and shape, from the few unknowns that move each point.
 
-use crate::body::Template;
-use crate::math::V3;
-use crate::mesh::Face;
-use crate::par::{self, Par};
-use crate::registration::Dof;
 use nalgebra::{DMatrix, DVector, Vector3};
+use tryon_body::Template;
+use tryon_geometry::math::V3;
+use tryon_geometry::mesh::Face;
+use tryon_geometry::par::{self, Par};
+use tryon_tracking::registration::Dof;
 
 /// Weight of tangential beside normal distances: limbs move along themselves only by it.
 const TANGENTIAL: f64 = 0.05;

@@ -1,14 +1,14 @@
 //! Course of the cloth around the legs, read off a scan: cloth in front of and behind the gap between them joins them.
 
 use super::model_fit::{AlignedBody, ModelFit};
-use crate::body::Template;
-use crate::clothcap::CaptureError;
-use crate::clothcap::scan::BodyScan;
-use crate::clothcap::topology::{ClothTemplate, LegTopology};
-use crate::math::{P3, V3};
-use crate::mesh::vertex_normals;
-use crate::par::Par;
+use crate::CaptureError;
+use crate::scan::BodyScan;
+use crate::topology::{ClothTemplate, LegTopology};
 use std::sync::Arc;
+use tryon_body::Template;
+use tryon_geometry::math::{P3, V3};
+use tryon_geometry::mesh::vertex_normals;
+use tryon_geometry::par::Par;
 
 /// Ways below the top of the tube that are looked at, metres: seats of trousers reach down to the first, the shortest
 /// skirts to the second.

@@ -6,19 +6,19 @@ use super::face_walk::QuerySurface;
 use super::jacobian::{JacobianRows, Match};
 use super::pairing::ScanNormal;
 use super::shape_unknowns::ShapeUnknowns;
-use crate::body::parts::BodySegment;
-use crate::body::{BodyShape, BoneTransforms, Pose, RestBody, Template, skin_moved};
-use crate::clothcap::CaptureError;
-use crate::clothcap::scalp::scalp;
-use crate::clothcap::scan::BodyScan;
-use crate::math::{P3, V3, World};
-use crate::par::{self, Par};
-use crate::registration::GemanMcClure;
-use crate::spatial::Bvh;
-use crate::tracking::{apply, linearise};
+use crate::CaptureError;
+use crate::scalp::scalp;
+use crate::scan::BodyScan;
 use nalgebra::DVector;
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
+use tryon_body::parts::BodySegment;
+use tryon_body::{BodyShape, BoneTransforms, Pose, RestBody, Template, skin_moved};
+use tryon_geometry::math::{P3, V3, World};
+use tryon_geometry::par::{self, Par};
+use tryon_geometry::spatial::Bvh;
+use tryon_tracking::registration::GemanMcClure;
+use tryon_tracking::{apply, linearise};
 
 /// Standard deviation of a scan point from the body, metres, and number of independent ones: neighbours share the cloth
 /// between. Their ratio weighs data against priors.
@@ -177,7 +177,7 @@ impl<'a> ModelFit<'a> {
     }
 
     /// The same with searches that start where the last one ended.
-    pub(in crate::clothcap) fn with_starts(mut self, starts_near: bool) -> Self {
+    pub(crate) fn with_starts(mut self, starts_near: bool) -> Self {
         self.starts_near = starts_near;
         self
     }
@@ -468,8 +468,8 @@ fn robust_mean(matches: &[Match], kernel: &GemanMcClure) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::body::{PoseShapes, embedded};
-    use crate::math::Rigid;
+    use tryon_body::{PoseShapes, embedded};
+    use tryon_geometry::math::Rigid;
 
     fn bent(template: &Template, elbow: f64) -> AlignedBody {
         let mut pose = Pose::<World>::rest(template.skeleton(), Rigid::identity());

@@ -1,21 +1,21 @@
 //! Pairs of scan points and surface points, by distance and direction of their normals.
 
-use crate::math::{P3, V3};
-use crate::mesh::face_normal;
-use crate::spatial::{Bvh, SurfacePoint};
+use tryon_geometry::math::{P3, V3};
+use tryon_geometry::mesh::face_normal;
+use tryon_geometry::spatial::{Bvh, SurfacePoint};
 
 /// Normal of a scan point.
 #[derive(Clone, Copy, Debug)]
-pub(in crate::clothcap) struct ScanNormal {
+pub(crate) struct ScanNormal {
     /// Unit vector; zero if unknown.
-    pub(in crate::clothcap) normal: V3,
+    pub(crate) normal: V3,
     /// Points outwards; else of either sign.
-    pub(in crate::clothcap) oriented: bool,
+    pub(crate) oriented: bool,
 }
 
 impl ScanNormal {
     /// Agrees with a unit normal of the surface to the least cosine; an unknown normal agrees with any.
-    pub(in crate::clothcap) fn agrees(&self, surface: &V3, least: f32) -> bool {
+    pub(crate) fn agrees(&self, surface: &V3, least: f32) -> bool {
         let cos = surface.dot(&self.normal);
         let cos = if self.oriented { cos } else { cos.abs() };
         self.normal == V3::zeros() || cos >= least
@@ -23,7 +23,7 @@ impl ScanNormal {
 }
 
 /// Surface point closest to a scan point, and the unit normal of its face; `None` if the normals differ.
-pub(in crate::clothcap) fn closest_facing(
+pub(crate) fn closest_facing(
     (bvh, surface): (&Bvh, &[P3]),
     point: &P3,
     normal: ScanNormal,

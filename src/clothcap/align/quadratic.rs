@@ -2,19 +2,19 @@
 //!
 //! x, y and z share one matrix, since every term measures a distance and no direction.
 
-use crate::clothcap::CaptureError;
-use crate::linear::{
+use crate::CaptureError;
+use nalgebra::{Matrix3, Vector3};
+use std::sync::Arc;
+use tryon_geometry::linear::{
     BlockJacobi, CgAccuracy, Factor, LinearError, StopCriterion, SymbolicFactor, SymmetricPattern,
     conjugate_gradient,
 };
-use crate::math::P3;
-use crate::mesh::{Csr, Face};
-use crate::par::Par;
-use nalgebra::{Matrix3, Vector3};
-use std::sync::Arc;
+use tryon_geometry::math::P3;
+use tryon_geometry::mesh::{Csr, Face};
+use tryon_geometry::par::Par;
 
 /// Weight of an edge of an even mesh in the Dirichlet energy of a displacement: the cotangent of 60°.
-pub(in crate::clothcap) const EVEN_EDGE: f64 = 0.577;
+pub(crate) const EVEN_EDGE: f64 = 0.577;
 
 /// End of an iteration on some vertices: the residual beside that before, and the most products.
 const STOP: StopCriterion = StopCriterion {

@@ -1,7 +1,7 @@
 //! Shape coefficients and bone scales as unknowns of a fit.
 
-use crate::body::parts::BodySegment;
-use crate::body::{BodyShape, Template};
+use tryon_body::parts::BodySegment;
+use tryon_body::{BodyShape, Template};
 
 /// Standard deviation of the scale of a bone.
 const SCALE_DEVIATION: f64 = 0.05;

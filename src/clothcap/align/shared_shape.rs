@@ -5,17 +5,17 @@ use super::body_equations::BodyEquations;
 use super::jacobian::Match;
 use super::model_fit::{AlignedBody, CONVERGED, FitStage, ModelFit, Prior};
 use super::shape_unknowns::ShapeUnknowns;
-use crate::body::{Pose, Template};
-use crate::clothcap::CaptureError;
-use crate::math::World;
-use crate::registration::GemanMcClure;
+use crate::CaptureError;
 use nalgebra::{DMatrix, DVector};
+use tryon_body::{Pose, Template};
+use tryon_geometry::math::World;
+use tryon_tracking::registration::GemanMcClure;
 
 /// Fits one shape to several scans; `bodies` are start and result, their shapes equal in the end. Shapes `[scans]`.
 ///
 /// # Errors
 /// [`CaptureError::Solve`].
-pub(in crate::clothcap) fn fit_shared_shape(
+pub(crate) fn fit_shared_shape(
     template: &Template,
     fits: &mut [ModelFit<'_>],
     bodies: &mut [AlignedBody],

@@ -1,15 +1,15 @@
 //! Start of an alignment: the tracker's poses in virtual depth images around the scan, without an A-pose.
 
 use super::model_fit::{AlignedBody, FitStage, ModelFit};
-use crate::body::{Pose, Template};
-use crate::clothcap::CaptureError;
-use crate::clothcap::scan::{BodyScan, ScanFrame};
-use crate::clothcap::virtual_camera::{VirtualCamera, bounds};
-use crate::formats::scan::ScanMesh;
-use crate::math::{Body, Rigid, World};
-use crate::tracking::{TrackerConfig, TrackerModel, TrackerState, Workspace, step};
+use crate::CaptureError;
+use crate::scan::{BodyScan, ScanFrame};
+use crate::virtual_camera::{VirtualCamera, bounds};
 use std::f64::consts::FRAC_PI_2;
 use std::sync::Arc;
+use tryon_body::{Pose, Template};
+use tryon_formats::scan::ScanMesh;
+use tryon_geometry::math::{Body, Rigid, World};
+use tryon_tracking::{TrackerConfig, TrackerModel, TrackerState, Workspace, step};
 
 /// Virtual cameras around the scan. With four, one sees the person within 45° of the front.
 const VIEWS: usize = 4;

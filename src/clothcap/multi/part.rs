@@ -1,13 +1,13 @@
 //! Parts of the multi-cloth template: faces of one garment, the body vertex of each of its vertices, and its boundary rings.
 
-use crate::body::Template;
-use crate::body::parts::BodySide;
-use crate::clothcap::face_edges::sides;
-use crate::clothcap::segment::{BodyRegion, Labelling, Slot};
-use crate::clothcap::topology::{ClothTemplate, LegTopology};
-use crate::mesh::Face;
+use crate::face_edges::sides;
+use crate::segment::{BodyRegion, Labelling, Slot};
+use crate::topology::{ClothTemplate, LegTopology};
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, BTreeSet};
+use tryon_body::Template;
+use tryon_body::parts::BodySide;
+use tryon_geometry::mesh::Face;
 
 /// Least number of faces of a piece; smaller ones are errors of the labels.
 pub(super) const LEAST_FACES: usize = 40;
@@ -263,7 +263,7 @@ fn ring_name(template: &Template, nodes: &[u32], ring: &[u32]) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::body::embedded;
+    use tryon_body::embedded;
 
     /// Labels by region: shirt on torso and upper arms, trousers on hips and thighs.
     fn labelling(template: &Template) -> Labelling {

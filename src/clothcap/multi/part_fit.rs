@@ -1,18 +1,18 @@
 //! Fit of one part to its scan points (eq. 15 to 21): data, boundary, coupling, Laplacian and boundary smoothness.
 
 use super::part::ClothPart;
-use crate::clothcap::CaptureError;
-use crate::clothcap::align::{
+use crate::CaptureError;
+use crate::align::{
     ActiveVertices, EVEN_EDGE, FaceCache, QuadraticEnergy, QueryCounts, QueryPoints, QuerySurface,
     ScanNormal, Stencil, VertexCounts,
 };
-use crate::clothcap::face_edges::{edges, neighbours};
-use crate::clothcap::scan::BodyScan;
-use crate::math::{P3, V3};
-use crate::mesh::{Csr, face_normal};
-use crate::registration::GemanMcClure;
-use crate::spatial::{Bvh, PointTree, SurfacePoint};
+use crate::face_edges::{edges, neighbours};
+use crate::scan::BodyScan;
 use std::sync::Arc;
+use tryon_geometry::math::{P3, V3};
+use tryon_geometry::mesh::{Csr, face_normal};
+use tryon_geometry::spatial::{Bvh, PointTree, SurfacePoint};
+use tryon_tracking::registration::GemanMcClure;
 
 /// Smallest cosine between normals of a pair.
 const NORMALS: f32 = 0.2;

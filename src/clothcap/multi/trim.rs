@@ -1,12 +1,12 @@
 //! Trimming of a captured part into cloth that can be worn: narrow tabs cut off, hems smoothed, self-intersections removed.
 
 use super::part::{ClothPart, LEAST_FACES, boundary_edges, drop_fans, drop_small_pieces};
-use crate::clothcap::face_edges::{edges, neighbours};
-use crate::math::P3;
-use crate::mesh::smoothing::half_mean;
-use crate::mesh::{Csr, Face, TriMesh};
-use crate::spatial::intersections;
+use crate::face_edges::{edges, neighbours};
 use std::collections::BTreeSet;
+use tryon_geometry::math::P3;
+use tryon_geometry::mesh::smoothing::half_mean;
+use tryon_geometry::mesh::{Csr, Face, TriMesh};
+use tryon_geometry::spatial::intersections;
 
 /// Rings of vertices that are taken off and put on again: tabs of twice as many rings (1 cm each) are cut off.
 const OPENING: usize = 2;
@@ -155,7 +155,7 @@ impl Cloth {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::clothcap::segment::Slot;
+    use crate::segment::Slot;
 
     /// A sheet of 20 by 20 cm with a tab 2 cm wide and 8 cm long at its upper side, quads of 1 cm.
     fn sheet_with_tab() -> (ClothPart, Vec<P3>) {

@@ -2,7 +2,7 @@
 
 use super::labelling::Labelling;
 use super::prior::Slot;
-use crate::mesh::Csr;
+use tryon_geometry::mesh::Csr;
 
 /// Share of the nodes of a garment's largest piece up to which another one, beside another garment, is an island.
 const ISLAND: f64 = 0.3;

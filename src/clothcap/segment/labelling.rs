@@ -3,13 +3,13 @@
 use super::color_mixture::ColorMixture;
 use super::node_colors::NodeColors;
 use super::prior::{BodyRegion, LONG_TOP, Slot};
-use crate::body::Template;
-use crate::clothcap::CaptureError;
-use crate::clothcap::mrf::{ExpansionConfig, MrfModel};
-use crate::clothcap::scalp::scalp;
-use crate::clothcap::topology::ClothTemplate;
+use crate::CaptureError;
+use crate::mrf::{ExpansionConfig, MrfModel};
+use crate::scalp::scalp;
+use crate::topology::ClothTemplate;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
+use tryon_body::Template;
 
 /// Cost of a label change between neighbours of equal colour, nats (ψ of eq. 14).
 const SMOOTHNESS: f32 = 2.0;

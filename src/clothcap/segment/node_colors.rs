@@ -3,15 +3,15 @@
 use super::color_mixture::{ColorMixture, hsv_cone};
 #[cfg(test)]
 use super::prior::BodyRegion;
-use crate::body::Template;
-use crate::clothcap::align::Alignment;
-use crate::clothcap::scan::BodyScan;
-#[cfg(test)]
-use crate::math::P3;
-use crate::math::V3;
-use crate::mesh::{Csr, vertex_normals};
-use crate::par::Par;
+use crate::align::Alignment;
+use crate::scan::BodyScan;
 use nalgebra::Vector3;
+use tryon_body::Template;
+#[cfg(test)]
+use tryon_geometry::math::P3;
+use tryon_geometry::math::V3;
+use tryon_geometry::mesh::{Csr, vertex_normals};
+use tryon_geometry::par::Par;
 
 /// Distance up to which a scan point belongs to the surface below it, metres.
 const NEAR: f32 = 0.03;

@@ -4,8 +4,8 @@ use super::color_mixture::ColorMixture;
 use super::labelling::{DISTINCT, LabelConfig, Labeller, Labelling};
 use super::node_colors::NodeColors;
 use super::prior::{BodyRegion, Slot};
-use crate::clothcap::CaptureError;
-use crate::clothcap::topology::{ClothTemplate, LegTopology};
+use crate::CaptureError;
+use crate::topology::{ClothTemplate, LegTopology};
 use nalgebra::Vector3;
 
 /// Least difference between the dyes of shoes and skin, light left out: bare feet have up to 0.11, shoes from 0.37.
@@ -177,8 +177,8 @@ fn ends(found: &Labelling) -> Option<[usize; 2]> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::body::embedded;
-    use crate::math::P3;
+    use tryon_body::embedded;
+    use tryon_geometry::math::P3;
 
     /// Labels of a top and bottom of one colour, the top `thick` metres over the bottom, and nodes of the top below the pelvis.
     fn label(thick: f32) -> (Labelling, usize) {

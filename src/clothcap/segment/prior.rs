@@ -1,8 +1,8 @@
 //! Garment prior over body parts (ε of eq. 12, figure 4): regions in which a garment is likely, possible or impossible.
 
-use crate::body::Template;
-use crate::body::parts::BodySegment;
 use serde::{Deserialize, Serialize};
+use tryon_body::Template;
+use tryon_body::parts::BodySegment;
 
 /// Cost of an impossible label, nats: no colour outweighs it.
 pub const IMPOSSIBLE: f32 = 60.0;
@@ -183,7 +183,7 @@ impl Slot {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::body::embedded;
+    use tryon_body::embedded;
 
     #[test]
     fn every_region_has_a_likely_label_and_is_found_on_the_body() {

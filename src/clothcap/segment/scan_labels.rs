@@ -3,12 +3,12 @@
 use super::color_mixture::hsv_cone;
 use super::labelling::Labelling;
 use super::prior::IMPOSSIBLE;
-use crate::clothcap::CaptureError;
-use crate::clothcap::align::SurfaceMatch;
-use crate::clothcap::mrf::{ExpansionConfig, MrfModel};
-use crate::clothcap::scan::BodyScan;
-use crate::mesh::{Csr, Face};
+use crate::CaptureError;
+use crate::align::SurfaceMatch;
+use crate::mrf::{ExpansionConfig, MrfModel};
+use crate::scan::BodyScan;
 use nalgebra::Vector3;
+use tryon_geometry::mesh::{Csr, Face};
 
 /// Width of the band about the template's boundaries in which the scan decides, rings of nodes.
 const BAND: u32 = 3;

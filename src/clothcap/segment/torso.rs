@@ -189,10 +189,10 @@ fn separation([a, b]: &[Vec<Vector3<f64>>; 2]) -> Option<(Vector3<f64>, f64)> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::body::embedded;
-    use crate::clothcap::segment::{BodyRegion, LabelConfig, NodeColors};
-    use crate::clothcap::topology::{ClothTemplate, LegTopology};
-    use crate::math::P3;
+    use crate::segment::{BodyRegion, LabelConfig, NodeColors};
+    use crate::topology::{ClothTemplate, LegTopology};
+    use tryon_body::embedded;
+    use tryon_geometry::math::P3;
 
     const SKIN: [f32; 3] = [205.0, 150.0, 120.0];
     const NAVY: [f32; 3] = [44.0, 52.0, 86.0];

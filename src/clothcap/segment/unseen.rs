@@ -3,10 +3,10 @@
 use super::labelling::Labelling;
 use super::node_colors::NodeColors;
 use super::prior::BodyRegion;
-use crate::body::Template;
-use crate::clothcap::align::SurfaceMatch;
-use crate::math::V3;
+use crate::align::SurfaceMatch;
 use std::collections::BTreeMap;
+use tryon_body::Template;
+use tryon_geometry::math::V3;
 
 /// Height of a slice across a bone, metres.
 const SLICE: f32 = 0.02;
@@ -54,7 +54,7 @@ pub fn unseen_regions(template: &Template, matches: &[SurfaceMatch]) -> Vec<Body
 }
 
 /// Bone of each node, and slice across it, `height` metres thick; shape `[nodes]`.
-pub(in crate::clothcap) fn bone_slices(template: &Template, height: f32) -> Vec<(usize, i32)> {
+pub(crate) fn bone_slices(template: &Template, height: f32) -> Vec<(usize, i32)> {
     let joints = template.skeleton().joints();
     let at = |j: usize| joints[j].rest.coords.cast::<f32>();
     let axis = |j: usize| -> V3 {

@@ -2,10 +2,10 @@
 
 use super::charts::{Chart, charts};
 use super::packing::{Packing, packed};
-use crate::math::P3;
-use crate::mesh::Face;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
+use tryon_geometry::math::P3;
+use tryon_geometry::mesh::Face;
 
 /// Widths of an image, texels; that of the smallest image that holds all charts is taken. The last is the longest side.
 const WIDTHS: [u32; 8] = [64, 128, 192, 256, 384, 512, 768, 1024];

@@ -1,9 +1,9 @@
 //! Charts of a surface: connected faces that look along one axis, projected along it without overlap.
 
-use crate::clothcap::face_edges::sides;
-use crate::math::{P3, V3};
-use crate::mesh::{Csr, Face, face_normal};
+use crate::face_edges::sides;
 use std::collections::BTreeMap;
+use tryon_geometry::math::{P3, V3};
+use tryon_geometry::mesh::{Csr, Face, face_normal};
 
 /// Axes of projection: garments at rest face +z and stand along +y.
 const AXES: [[f32; 3]; 6] = [

@@ -1,9 +1,9 @@
 //! Image of a texture atlas: texels that something was seen at, and the others filled from them.
 
 use super::atlas::{Texel, TextureAtlas};
-use crate::camera::ColorImage;
-use crate::formats::image::sample_texture;
-use crate::par::{self, Par};
+use tryon_formats::image::sample_texture;
+use tryon_geometry::camera::ColorImage;
+use tryon_geometry::par::{self, Par};
 
 /// Image of one garment.
 #[derive(Clone, Debug, PartialEq)]

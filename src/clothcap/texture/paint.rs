@@ -2,12 +2,12 @@
 
 use super::atlas::TextureAtlas;
 use super::image::GarmentTexture;
-use crate::clothcap::align::{ScanNormal, closest_facing};
-use crate::clothcap::scan::{BodyScan, TextureColor, mean_spacing};
-use crate::math::{P3, V3};
-use crate::mesh::Face;
-use crate::par::{self, Par};
-use crate::spatial::{Bvh, HashGrid};
+use crate::align::{ScanNormal, closest_facing};
+use crate::scan::{BodyScan, TextureColor, mean_spacing};
+use tryon_geometry::math::{P3, V3};
+use tryon_geometry::mesh::Face;
+use tryon_geometry::par::{self, Par};
+use tryon_geometry::spatial::{Bvh, HashGrid};
 
 /// Smallest cosine between the normals of a point and of the garment.
 const NORMALS: f32 = 0.2;
@@ -23,7 +23,7 @@ const SEEN: f32 = 0.056;
 const FILLED: f32 = 0.005;
 
 /// Coloured points of one garment on its posed surface.
-pub(in crate::clothcap) struct ScanPaint {
+pub(crate) struct ScanPaint {
     /// Nearest points of the surface, metres.
     points: Vec<P3>,
     colors: Vec<[f32; 3]>,
@@ -34,7 +34,7 @@ pub(in crate::clothcap) struct ScanPaint {
 
 impl ScanPaint {
     /// Colours of a scan at points for which `is_own` holds, moved onto a posed surface.
-    pub(in crate::clothcap) fn new(
+    pub(crate) fn new(
         scan: &BodyScan,
         is_own: impl Fn(usize) -> bool,
         (faces, vertices): (&[Face], &[P3]),
@@ -72,7 +72,7 @@ impl ScanPaint {
     }
 
     /// Paints the texels of a garment that no scan before showed; `colors` are those of its vertices, sRGB.
-    pub(in crate::clothcap) fn apply(
+    pub(crate) fn apply(
         &self,
         texture: &mut GarmentTexture,
         atlas: &TextureAtlas,

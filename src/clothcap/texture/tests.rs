@@ -1,10 +1,10 @@
 //! Atlases of tubes and folds, and their images painted from synthetic scans.
 
 use super::*;
-use crate::clothcap::scan::{BodyScan, TextureColor};
-use crate::math::{P3, V3};
-use crate::mesh::Face;
+use crate::scan::{BodyScan, TextureColor};
 use std::f32::consts::TAU;
+use tryon_geometry::math::{P3, V3};
+use tryon_geometry::mesh::Face;
 
 /// Texel of the tests, metres.
 const TEXEL: f32 = 0.002;
@@ -187,7 +187,7 @@ fn texels_have_the_paint_of_the_scan_and_later_scans_fill_the_rest() {
     let stored = (texture.image().clone(), texture.seen_image());
     let read = GarmentTexture::from_images(&atlas, stored.0, &stored.1);
     assert_eq!(read.as_ref(), Some(&texture));
-    let other = crate::camera::ColorImage::filled(3, 3, [0; 3]);
+    let other = tryon_geometry::camera::ColorImage::filled(3, 3, [0; 3]);
     assert_eq!(
         GarmentTexture::from_images(&atlas, other.clone(), &other),
         None

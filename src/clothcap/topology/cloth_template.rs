@@ -2,14 +2,14 @@
 
 use super::meridian::{Crotch, leg_vertices, meridians};
 use super::strip::{Between, Strip};
-use crate::body::parts::BodySide;
-use crate::body::{BodyError, ShapeSpace, SkinWeights, Template};
-use crate::clothcap::CaptureError;
-use crate::math::{P3, V3};
-use crate::mesh::{Face, TriMesh};
+use crate::CaptureError;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
 use std::sync::Arc;
+use tryon_body::parts::BodySide;
+use tryon_body::{BodyError, ShapeSpace, SkinWeights, Template};
+use tryon_geometry::math::{P3, V3};
+use tryon_geometry::mesh::{Face, TriMesh};
 
 /// Edges across the tube, metres.
 const SPACING: f32 = 0.02;
@@ -259,7 +259,7 @@ fn extended(body: &Template, between: &[Between], faces: Vec<Face>) -> Result<Te
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::body::embedded;
+    use tryon_body::embedded;
 
     #[test]
     fn joined_legs_are_one_tube() {

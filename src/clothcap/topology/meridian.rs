@@ -1,9 +1,9 @@
 //! Lines down the front and the back of a leg, along the edges of a template.
 
-use crate::body::Template;
-use crate::body::parts::{BodySegment, BodySide};
-use crate::math::P3;
-use crate::mesh::distances;
+use tryon_body::Template;
+use tryon_body::parts::{BodySegment, BodySide};
+use tryon_geometry::math::P3;
+use tryon_geometry::mesh::distances;
 
 /// Depth of the middle of the body below its front- or backmost points at the height where the lines part, metres.
 const HOLLOW: f32 = 0.012;

@@ -1,7 +1,7 @@
 //! Strip of triangles between two lines of vertices.
 
-use crate::math::P3;
-use crate::mesh::{Face, face_normal};
+use tryon_geometry::math::P3;
+use tryon_geometry::mesh::{Face, face_normal};
 
 /// Vertex between two others: share 0 is the first, 1 the second.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -148,8 +148,8 @@ mod tests {
             .map(|f| face_normal(&all, f).z / 2.0)
             .sum();
         assert!((area - 0.5).abs() < 1e-5, "{area}");
-        let mesh = crate::mesh::TriMesh::new(all, strip.faces).expect("faces in range");
-        let topology = crate::mesh::Topology::new(&mesh).expect("manifold");
+        let mesh = tryon_geometry::mesh::TriMesh::new(all, strip.faces).expect("faces in range");
+        let topology = tryon_geometry::mesh::Topology::new(&mesh).expect("manifold");
         assert!(!topology.is_closed());
     }
 }

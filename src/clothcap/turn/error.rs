@@ -1,7 +1,7 @@
 //! Error of a capture from one camera.
 
-use crate::clothcap::CaptureError;
-use crate::tracking::StepError;
+use crate::CaptureError;
+use tryon_tracking::StepError;
 
 /// Recording that yields no scan.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]

@@ -1,11 +1,11 @@
 //! Points of one frame on the tracked subject, with normals from local planes of the depth image.
 
-use crate::camera::{Calibration, ColorImage, DepthImage, Intrinsics, RgbdFrame};
-use crate::clothcap::scan::BodyScan;
-use crate::math::{Camera, P3, Rigid, V3, World};
-use crate::par::{self, Par};
-use crate::spatial::PointTree;
+use crate::scan::BodyScan;
 use nalgebra::{Matrix3, Vector3};
+use tryon_geometry::camera::{Calibration, ColorImage, DepthImage, Intrinsics, RgbdFrame};
+use tryon_geometry::math::{Camera, P3, Rigid, V3, World};
+use tryon_geometry::par::{self, Par};
+use tryon_geometry::spatial::PointTree;
 
 /// Distance from the tracked body within which a reading is the subject for certain, metres.
 const CERTAIN: f32 = 0.05;

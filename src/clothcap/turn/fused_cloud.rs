@@ -1,16 +1,16 @@
 //! Points of many poses in one: each point moves with the surface that it lies on.
 
 use super::moving_parts::MovingParts;
-use crate::body::{BoneTransforms, SkinWeights, Template};
-use crate::clothcap::align::{ScanNormal, closest_facing};
-use crate::clothcap::blended;
-use crate::clothcap::scan::BodyScan;
-use crate::math::{P3, V3};
-use crate::mesh::Face;
-use crate::par::{self, Par};
-use crate::spatial::Bvh;
+use crate::align::{ScanNormal, closest_facing};
+use crate::blended;
+use crate::scan::BodyScan;
 use nalgebra::{Isometry3, Matrix4, Vector3};
 use std::collections::BTreeMap;
+use tryon_body::{BoneTransforms, SkinWeights, Template};
+use tryon_geometry::math::{P3, V3};
+use tryon_geometry::mesh::Face;
+use tryon_geometry::par::{self, Par};
+use tryon_geometry::spatial::Bvh;
 
 /// Farthest that a point of the subject lies off the surface, metres.
 const FARTHEST: f32 = 0.06;

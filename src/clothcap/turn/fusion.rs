@@ -5,13 +5,13 @@ use super::key_frames::{KeyFrame, KeyFrames, moved};
 use super::moving_parts::MovingParts;
 use super::multi_view::{self, RegisteredFrame, measure, register};
 use super::{KeyFrameReport, TurnError, TurnReport};
-use crate::body::{BodyShape, BoneTransforms, Pose, Template, skin};
-use crate::clothcap::align::{AlignedBody, FreeSurface, ModelFit, Start, SurfaceFitConfig};
-use crate::clothcap::scan::BodyScan;
-use crate::clothcap::segment::{BodyRegion, unseen_regions};
-use crate::math::{Camera, P3, P3d, Rigid, World};
-use crate::par::Par;
+use crate::align::{AlignedBody, FreeSurface, ModelFit, Start, SurfaceFitConfig};
+use crate::scan::BodyScan;
+use crate::segment::{BodyRegion, unseen_regions};
 use std::sync::Arc;
+use tryon_body::{BodyShape, BoneTransforms, Pose, Template, skin};
+use tryon_geometry::math::{Camera, P3, P3d, Rigid, World};
+use tryon_geometry::par::Par;
 
 /// Points in the comparison of scan and body.
 const SAMPLES: usize = 1500;

@@ -2,15 +2,15 @@
 
 use super::TurnError;
 use super::frame_points::camera_points;
-use crate::body::{BodyShape, Pose, Template};
-use crate::camera::{Calibration, RgbdFrame};
-use crate::clothcap::scan::BodyScan;
-use crate::math::{Camera, P3, Rigid, V3, World};
-use crate::tracking::{
-    PartClasses, TrackerConfig, TrackerModel, TrackerState, Workspace, step, yaw_of_joints,
-};
+use crate::scan::BodyScan;
 use std::f64::consts::TAU;
 use std::sync::Arc;
+use tryon_body::{BodyShape, Pose, Template};
+use tryon_geometry::camera::{Calibration, RgbdFrame};
+use tryon_geometry::math::{Camera, P3, Rigid, V3, World};
+use tryon_tracking::{
+    PartClasses, TrackerConfig, TrackerModel, TrackerState, Workspace, step, yaw_of_joints,
+};
 
 /// Key frames of a whole turn: one every 15°, so that each place is seen by eight within 60° of its normal.
 const BINS: usize = 24;

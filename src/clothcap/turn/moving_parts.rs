@@ -1,7 +1,7 @@
 //! Parts of the body that move as one while the subject turns.
 
-use crate::body::Template;
-use crate::body::parts::BodyPart;
+use tryon_body::Template;
+use tryon_body::parts::BodyPart;
 
 /// Parts of the body that move as one: pelvis, chest, head, arms, legs.
 #[derive(Debug)]

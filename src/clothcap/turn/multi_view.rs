@@ -5,13 +5,13 @@
 
 use super::fused_cloud::FusedPoint;
 use super::moving_parts::MovingParts;
-use crate::clothcap::CaptureError;
-use crate::math::{P3, P3d};
-use crate::par::{self, Par};
-use crate::registration::GemanMcClure;
-use crate::spatial::PointTree;
+use crate::CaptureError;
 use nalgebra::{DMatrix, DVector, Isometry3, Translation3, UnitQuaternion, Vector3, Vector6};
 use std::f64::consts::TAU;
+use tryon_geometry::math::{P3, P3d};
+use tryon_geometry::par::{self, Par};
+use tryon_geometry::spatial::PointTree;
+use tryon_tracking::registration::GemanMcClure;
 
 /// Points of a frame that are paired in an iteration.
 const SAMPLES: usize = 900;

@@ -1,6 +1,6 @@
 //! Report of a capture from one camera.
 
-use crate::clothcap::segment::BodyRegion;
+use crate::segment::BodyRegion;
 use serde::{Deserialize, Serialize};
 
 /// Largest gap between the yaws of a whole turn, degrees: a camera sees 60° to either side of the direction it faces.

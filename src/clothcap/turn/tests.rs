@@ -3,16 +3,16 @@
 use super::frame_points::camera_points;
 use super::key_frames::{KeyFrame, KeyFrames};
 use super::{TurnConfig, TurnError, TurnTracker, fuse};
-use crate::body::{BodyShape, BoneTransforms, Pose, embedded, skin};
-use crate::camera::{Calibration, DepthImage, Intrinsics, RgbdFrame};
-use crate::clothcap::scan::BodyScan;
-use crate::clothcap::segment::BodyRegion;
-use crate::clothcap::virtual_camera::{VirtualCamera, bounds};
-use crate::math::{P3, Rigid, World};
-use crate::par::Par;
-use crate::spatial::Bvh;
+use crate::scan::BodyScan;
+use crate::segment::BodyRegion;
+use crate::virtual_camera::{VirtualCamera, bounds};
 use nalgebra::{UnitQuaternion, Vector3};
 use std::f64::consts::{PI, TAU};
+use tryon_body::{BodyShape, BoneTransforms, Pose, embedded, skin};
+use tryon_geometry::camera::{Calibration, DepthImage, Intrinsics, RgbdFrame};
+use tryon_geometry::math::{P3, Rigid, World};
+use tryon_geometry::par::Par;
+use tryon_geometry::spatial::Bvh;
 
 /// Views of a body that stands with arms half raised, and its true surface as the camera faces it.
 fn views(count: usize) -> (KeyFrames, Vec<P3>) {

@@ -2,12 +2,12 @@
 
 use super::context::{DrapeContext, OuterGarment};
 use super::state::Drape;
-use crate::contact::{ClosestPoint, Part};
-use crate::dressing::plane::DrapePlane;
-use crate::dressing::skin::Skin;
-use crate::garment::Region;
-use crate::math::{P3, V3d};
-use crate::par::Par;
+use crate::plane::DrapePlane;
+use crate::skin::Skin;
+use tryon_cloth::contact::{ClosestPoint, Part};
+use tryon_garment::Region;
+use tryon_geometry::math::{P3, V3d};
+use tryon_geometry::par::Par;
 
 /// Distance beyond which a plane is ignored (m).
 const REACH: f64 = 0.10;
@@ -33,7 +33,7 @@ const DEEP: f64 = 0.003;
 
 impl Drape {
     /// Finds the nearest body vertices among all.
-    pub(in crate::dressing) fn find_nearest(&mut self, skin: &Skin<'_>) {
+    pub(crate) fn find_nearest(&mut self, skin: &Skin<'_>) {
         let points = self.positions();
         let other: Vec<Part> = self.own.iter().map(|o| Region::ALL.0 & !o).collect();
         let of = |masks: &[Part]| {
@@ -44,7 +44,7 @@ impl Drape {
         self.nearest = both.map(|(own, other)| [own, other]).collect();
     }
     /// Takes the nearest body vertices from a coarser drape of the same garment.
-    pub(in crate::dressing) fn find_nearest_from(&mut self, skin: &Skin<'_>, coarse: &Self) {
+    pub(crate) fn find_nearest_from(&mut self, skin: &Skin<'_>, coarse: &Self) {
         self.fine = true;
         for (i, near) in self.nearest.iter_mut().enumerate() {
             let d = |k: usize| (coarse.x[k] - self.x[i]).norm_squared();
@@ -188,7 +188,7 @@ impl Drape {
         0.0
     }
     /// Moves cloth deep under the skin to the skin.
-    pub(in crate::dressing) fn lift_deep(&mut self, skin: &Skin<'_>) {
+    pub(crate) fn lift_deep(&mut self, skin: &Skin<'_>) {
         for i in 0..self.x.len() {
             let c = skin.closest(&self.point(i), self.nearest[i][0], self.own[i]);
             let deep = f64::from(c.signed_distance) < -DEEP

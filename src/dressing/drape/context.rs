@@ -1,8 +1,8 @@
 //! Surroundings of one garment that is being draped.
 
-use crate::contact::{SurfaceFrame, SurfaceModel};
-use crate::dressing::skin::Skin;
-use crate::garment::{GarmentError, GarmentMesh};
+use crate::skin::Skin;
+use tryon_cloth::contact::{SurfaceFrame, SurfaceModel};
+use tryon_garment::{GarmentError, GarmentMesh};
 
 /// A garment that others are worn under.
 #[derive(Debug)]
@@ -23,7 +23,7 @@ impl OuterGarment {
 
 /// Skin below and garments above.
 #[derive(Clone, Copy, Debug)]
-pub(in crate::dressing) struct DrapeContext<'a> {
+pub(crate) struct DrapeContext<'a> {
     pub(super) skin: &'a Skin<'a>,
     /// Distance from the skin (m).
     pub(super) offset: f64,

@@ -2,22 +2,19 @@
 
 use super::context::{DrapeContext, OuterGarment};
 use super::state::Drape;
-use crate::dressing::skin::Skin;
-use crate::garment::{GarmentError, GarmentMesh};
-use crate::par::Par;
+use crate::skin::Skin;
+use tryon_garment::{GarmentError, GarmentMesh};
+use tryon_geometry::par::Par;
 
 /// Garments, innermost first: each is kept under those further out.
 #[derive(Debug, Default)]
-pub(in crate::dressing) struct Layers {
-    pub(in crate::dressing) drapes: Vec<Drape>,
+pub(crate) struct Layers {
+    pub(crate) drapes: Vec<Drape>,
     surfaces: Vec<OuterGarment>,
 }
 
 impl Layers {
-    pub(in crate::dressing) fn new(
-        meshes: &[GarmentMesh],
-        drapes: Vec<Drape>,
-    ) -> Result<Self, GarmentError> {
+    pub(crate) fn new(meshes: &[GarmentMesh], drapes: Vec<Drape>) -> Result<Self, GarmentError> {
         Ok(Self {
             surfaces: meshes
                 .iter()
@@ -27,7 +24,7 @@ impl Layers {
         })
     }
     /// Applies `f` to every garment, the outermost first; `offsets` from the skin (m).
-    pub(in crate::dressing) fn each(
+    pub(crate) fn each(
         &mut self,
         skin: &Skin<'_>,
         offsets: &[f64],

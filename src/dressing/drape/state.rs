@@ -1,16 +1,16 @@
 //! State of one garment that is being draped.
 
-use crate::cloth::repair::sleeve_rings::Sleeve;
-use crate::cloth::repair::untangler::Untangler;
-use crate::cloth::{Hinge, Sheet};
-use crate::contact::Part;
-use crate::dressing::hood::Hood;
-use crate::dressing::plane::DrapePlane;
-use crate::dressing::skin::Skin;
-use crate::garment::{GarmentError, GarmentMesh, Region};
-use crate::math::{P3, V3d};
-use crate::mesh::distances;
+use crate::hood::Hood;
+use crate::plane::DrapePlane;
+use crate::skin::Skin;
 use std::collections::BTreeSet;
+use tryon_cloth::contact::Part;
+use tryon_cloth::sleeve_rings::Sleeve;
+use tryon_cloth::untangler::Untangler;
+use tryon_cloth::{Hinge, Sheet};
+use tryon_garment::{GarmentError, GarmentMesh, Region};
+use tryon_geometry::math::{P3, V3d};
+use tryon_geometry::mesh::distances;
 
 /// Share of the membrane stiffness that an edge of a hexagonal spring lattice carries: √3/2.
 const LATTICE: f64 = 0.866;
@@ -34,9 +34,9 @@ pub(super) struct EdgeConstraint {
 
 /// One garment being draped.
 #[derive(Debug, Default)]
-pub(in crate::dressing) struct Drape {
+pub(crate) struct Drape {
     /// Positions in the world (m).
-    pub(in crate::dressing) x: Vec<V3d>,
+    pub(crate) x: Vec<V3d>,
     pub(super) velocity: Vec<V3d>,
     /// Positions at the begin of the substep (m).
     pub(super) before: Vec<V3d>,
@@ -50,7 +50,7 @@ pub(in crate::dressing) struct Drape {
     /// True where friction keeps a vertex from sliding up: around the trunk, away from sleeves and shoulders.
     pub(super) held_down: Vec<bool>,
     /// Nearest body vertex among the own parts, then among the others.
-    pub(in crate::dressing) nearest: Vec<[u32; 2]>,
+    pub(crate) nearest: Vec<[u32; 2]>,
     pub(super) planes: Vec<[DrapePlane; 2]>,
     /// Nearest vertex of every garment further out, shape `[garments][vertices]`.
     pub(super) nearest_outer: Vec<Vec<u32>>,
@@ -69,7 +69,7 @@ pub(in crate::dressing) struct Drape {
     /// True once it was smoothed locally, which leaves it compressed.
     pub(super) compressed: bool,
     /// Substeps so far.
-    pub(in crate::dressing) steps: usize,
+    pub(crate) steps: usize,
 }
 
 /// True for cloth that belongs to arms alone: a sleeve.
@@ -78,7 +78,7 @@ pub(super) fn on_arms(own: Part) -> bool {
 }
 
 impl Drape {
-    pub(in crate::dressing) fn new(mesh: &GarmentMesh, sheet: &Sheet, x: Vec<P3>) -> Self {
+    pub(crate) fn new(mesh: &GarmentMesh, sheet: &Sheet, x: Vec<P3>) -> Self {
         let n = x.len();
         let own: Vec<Part> = mesh.regions.iter().map(|r| r.decisive().0).collect();
         Self {
@@ -98,7 +98,7 @@ impl Drape {
         }
     }
     /// The same with untangling of the sheet, and contact of a hood with itself.
-    pub(in crate::dressing) fn with_untangling(
+    pub(crate) fn with_untangling(
         mut self,
         mesh: &GarmentMesh,
         sheet: &Sheet,
@@ -108,7 +108,7 @@ impl Drape {
         Ok(self)
     }
     /// Positions in single precision (m).
-    pub(in crate::dressing) fn positions(&self) -> Vec<P3> {
+    pub(crate) fn positions(&self) -> Vec<P3> {
         self.x.iter().map(|p| P3::from(p.cast::<f32>())).collect()
     }
     /// Position of one vertex in single precision (m).
@@ -123,11 +123,11 @@ impl Drape {
         }
     }
     /// Sets all velocities to zero.
-    pub(in crate::dressing) fn stop(&mut self) {
+    pub(crate) fn stop(&mut self) {
         self.velocity.fill(V3d::zeros());
     }
     /// True if the last intersections include cloth that is on no arm.
-    pub(in crate::dressing) fn crosses_off_arms(&self) -> bool {
+    pub(crate) fn crosses_off_arms(&self) -> bool {
         let crosses = |u: &Untangler| {
             let mut all = u.displacements.iter().zip(&self.own);
             all.any(|((_, n), own)| *n > 0.0 && !on_arms(*own))
@@ -135,7 +135,7 @@ impl Drape {
         self.crossings > 0 && self.untangler.as_ref().is_some_and(crosses)
     }
     /// Largest depth of a vertex under the skin of its own parts (m), and the 99th percentile of the edges' stretch.
-    pub(in crate::dressing) fn measure(&self, skin: &Skin<'_>) -> (f64, f64) {
+    pub(crate) fn measure(&self, skin: &Skin<'_>) -> (f64, f64) {
         let mut deepest = 0.0f64;
         for i in 0..self.x.len() {
             let c = skin.closest(&self.point(i), self.nearest[i][0], self.own[i]);

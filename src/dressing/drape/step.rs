@@ -2,8 +2,8 @@
 
 use super::context::DrapeContext;
 use super::state::Drape;
-use crate::cloth::solver::xpbd::constraints::{project_distance, project_hinge};
-use crate::math::V3d;
+use tryon_cloth::solver::xpbd::constraints::{project_distance, project_hinge};
+use tryon_geometry::math::V3d;
 
 /// m/s².
 const GRAVITY: f64 = 9.81;
@@ -25,13 +25,7 @@ const SWEEPS: usize = 4;
 impl Drape {
     /// Runs `steps` substeps of `h` seconds on a body and under garments that stand still. `weight` scales gravity: first
     /// gaps between panels close, then cloth falls.
-    pub(in crate::dressing) fn run(
-        &mut self,
-        context: &DrapeContext<'_>,
-        steps: usize,
-        h: f64,
-        weight: f64,
-    ) {
+    pub(crate) fn run(&mut self, context: &DrapeContext<'_>, steps: usize, h: f64, weight: f64) {
         self.steps += steps;
         for s in 0..steps {
             let queries = s % QUERY_INTERVAL == 0;

@@ -1,10 +1,10 @@
 //! Motion of a garment with the body between two poses.
 
 use super::state::{Drape, on_arms};
-use crate::cloth::AnchorBinding;
-use crate::contact::SurfaceFrame;
-use crate::dressing::skin::Skin;
-use crate::math::{P3, V3, V3d};
+use crate::skin::Skin;
+use tryon_cloth::AnchorBinding;
+use tryon_cloth::contact::SurfaceFrame;
+use tryon_geometry::math::{P3, V3, V3d};
 
 /// Distance from the skin up to which cloth follows it (m); the share fades to zero at twice that.
 const FOLLOWING: f64 = 0.04;
@@ -13,7 +13,7 @@ const FOLLOWING_SLEEVE: f64 = 0.07;
 
 impl Drape {
     /// Pins the rigid anchors to the body of `frame`.
-    pub(in crate::dressing) fn pin(&mut self, anchors: &[AnchorBinding], frame: &SurfaceFrame) {
+    pub(crate) fn pin(&mut self, anchors: &[AnchorBinding], frame: &SurfaceFrame) {
         self.pinned.fill(None);
         for a in anchors.iter().filter(|a| a.strength >= 1.0) {
             let [p, q, r] = a.body.map(|v| frame.vertices[v as usize].coords);
@@ -26,7 +26,7 @@ impl Drape {
         }
     }
     /// Moves cloth near the skin with a body that goes from `from` to `to` (m).
-    pub(in crate::dressing) fn follow_skin(&mut self, from: &[P3], to: &[P3]) {
+    pub(crate) fn follow_skin(&mut self, from: &[P3], to: &[P3]) {
         for ((x, near), own) in self.x.iter_mut().zip(&self.nearest).zip(&self.own) {
             let v = near[0] as usize;
             let d = (from[v].coords.cast::<f64>() - *x).norm();
@@ -40,7 +40,7 @@ impl Drape {
         }
     }
     /// Puts rings of sleeves that lost their arm around it again.
-    pub(in crate::dressing) fn recover_sleeves(&mut self, skin: &Skin<'_>) {
+    pub(crate) fn recover_sleeves(&mut self, skin: &Skin<'_>) {
         let lines = skin.arm_lines();
         let at = |v: u32| self.point(v as usize);
         let targets: Vec<(u32, P3)> = self

@@ -3,9 +3,9 @@
 use super::context::DrapeContext;
 use super::state::{Drape, on_arms};
 use super::step::QUERY_INTERVAL;
-use crate::cloth::repair::untangler::{UNTANGLE_GAP, UNTANGLE_STEP};
-use crate::cloth::solver::xpbd::constraints::project_distance;
-use crate::par::Par;
+use tryon_cloth::solver::xpbd::constraints::project_distance;
+use tryon_cloth::untangler::{UNTANGLE_GAP, UNTANGLE_STEP};
+use tryon_geometry::par::Par;
 
 /// Growth of a tangled vertex's slack in one iteration, and its limit (m): between two skins the offset is the only clearance.
 const SLACK_STEP: f64 = 0.001;
@@ -53,11 +53,7 @@ impl Drape {
     /// Untangles the sheet in at most `most` iterations on a body that stands still, and stops it if it intersected. After
     /// [`RELAXED`] iterations only overstretched edges and deep contacts move it. Without progress it is smoothed locally,
     /// in a wider circle each time. Returns the number of intersections left.
-    pub(in crate::dressing) fn untangle_at_rest(
-        &mut self,
-        context: &DrapeContext<'_>,
-        most: usize,
-    ) -> usize {
+    pub(crate) fn untangle_at_rest(&mut self, context: &DrapeContext<'_>, most: usize) -> usize {
         let (mut fewest, mut since, mut smoothings) = (usize::MAX, 0, 0);
         for k in 0..most {
             self.before.clone_from(&self.x);

@@ -1,9 +1,9 @@
 //! The anchors of a piece of cloth: its highest opening, or the cloth on the shoulders.
 
 use super::classifier::{PieceShape, Support};
-use crate::body::Template;
-use crate::garment::{AnchorKind, AnchorSet};
-use crate::math::P3;
+use tryon_body::Template;
+use tryon_garment::{AnchorKind, AnchorSet};
+use tryon_geometry::math::P3;
 
 /// Height of the anchored ring at the top of cloth without an opening there, metres.
 const RING: f32 = 0.025;

@@ -1,15 +1,15 @@
 //! Classification of a piece of a mesh garment by the skin it lies over.
 
-use crate::body::Template;
-use crate::body::parts::vertex_masks;
-use crate::dressing::file_frame::bounds;
-use crate::dressing::skin_binding::SkinBinding;
-use crate::formats::sewn_obj::SewnObj;
-use crate::garment::{GarmentKind, Region};
-use crate::math::P3;
-use crate::mesh::Topology;
-use crate::spatial::PointTree;
+use crate::file_frame::bounds;
+use crate::skin_binding::SkinBinding;
 use std::collections::{BTreeMap, BTreeSet};
+use tryon_body::Template;
+use tryon_body::parts::vertex_masks;
+use tryon_formats::sewn_obj::SewnObj;
+use tryon_garment::{GarmentKind, Region};
+use tryon_geometry::math::P3;
+use tryon_geometry::mesh::Topology;
+use tryon_geometry::spatial::PointTree;
 
 /// A piece smaller than this in every direction is a button or a buckle, metres.
 const SMALLEST: f32 = 0.08;

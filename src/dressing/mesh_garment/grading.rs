@@ -1,9 +1,9 @@
 //! Grading of rest triangles: stretched around and along the limb that they lie over, by the steps of the size table.
 
-use crate::body::Template;
-use crate::garment::SizeRow;
-use crate::math::{P3, V3d};
 use nalgebra::{Matrix2, Matrix3x2, Vector2};
+use tryon_body::Template;
+use tryon_garment::SizeRow;
+use tryon_geometry::math::{P3, V3d};
 
 /// Trunk, left arm, right arm, left leg, right leg.
 pub(super) const LIMBS: usize = 5;
@@ -41,7 +41,7 @@ impl LimbAxes {
                 (_, true) => 3,
                 _ => return 0,
             };
-            let is_right = parts.side(j) == Some(crate::body::parts::BodySide::Right);
+            let is_right = parts.side(j) == Some(tryon_body::parts::BodySide::Right);
             first + u8::from(is_right)
         };
         Self {
@@ -127,10 +127,10 @@ impl Grading<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::body::embedded;
-    use crate::garment::import::unfold;
-    use crate::garment::{Size, rest_area};
     use std::f32::consts::TAU;
+    use tryon_body::embedded;
+    use tryon_garment::import::unfold;
+    use tryon_garment::{Size, rest_area};
 
     const OVER_TRUNK: LimbShares = [1.0, 0.0, 0.0, 0.0, 0.0];
 

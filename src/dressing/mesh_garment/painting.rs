@@ -1,11 +1,11 @@
 //! Image on a mesh garment: the surface that it is painted on, and the drawn mesh that shows it.
 
 use super::read::MeshGarment;
-use crate::garment::{FabricImage, RenderMesh};
-use crate::math::P3;
-use crate::mesh::Face;
 use std::collections::BTreeMap;
 use std::sync::Arc;
+use tryon_garment::{FabricImage, RenderMesh};
+use tryon_geometry::math::P3;
+use tryon_geometry::mesh::Face;
 
 impl MeshGarment {
     /// Surface of all pieces on the body that it was made on, metres.

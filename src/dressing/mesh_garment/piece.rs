@@ -5,19 +5,19 @@ use super::classifier::{LEGS, PieceClassifier, PieceShape, Support};
 use super::grading::{Grading, LimbShares};
 use super::skin_lift::SkinLift;
 use super::surface::{follow_both_legs, orient_outwards, unroll};
-use crate::dressing::retarget::Retargeting;
-use crate::dressing::skin_binding::SkinBinding;
-use crate::formats::obj::ObjMesh;
-use crate::formats::sewn_obj::SewnObj;
-use crate::garment::import::{
+use crate::retarget::Retargeting;
+use crate::skin_binding::SkinBinding;
+use tryon_formats::obj::ObjMesh;
+use tryon_formats::sewn_obj::SewnObj;
+use tryon_garment::import::{
     coarsen, from_mesh, median_edge, panels_in_metres, some_faces, unfold, widened,
 };
-use crate::garment::{
+use tryon_garment::{
     AnchorKind, AnchorSet, GarmentError, GarmentKind, GarmentMesh, Material, Region, Size,
     rest_area,
 };
-use crate::math::P3;
-use crate::mesh::{Face, Topology, TriMesh, face_normal, remesh};
+use tryon_geometry::math::P3;
+use tryon_geometry::mesh::{Face, Topology, TriMesh, face_normal, remesh};
 
 /// Share of the wanted edge length below which panels are coarsened: finer ones cannot be simulated in time.
 const FINER: f64 = 0.7;
@@ -295,8 +295,8 @@ fn take_rest(x: &[P3], garment: &mut GarmentMesh) {
 mod tests {
     use super::super::layers::by_layer;
     use super::*;
-    use crate::body::embedded;
     use std::f32::consts::TAU;
+    use tryon_body::embedded;
 
     /// An upright open tube around (0, 0) in the file's own coordinates.
     fn tube(radius: f32, y: std::ops::Range<f32>) -> SewnObj {

@@ -5,24 +5,24 @@ use super::layers::by_layer;
 use super::piece::{GarmentPiece, PieceBuilder};
 use super::sizing::{Sizing, SourceCloth};
 use super::skin_lift::SkinLift;
-use crate::body::Template;
-use crate::body::measure::Measurements;
-use crate::dressing::body_sections::BodySections;
-use crate::dressing::error::MeshGarmentError;
-use crate::dressing::finished::FinishedGarment;
-use crate::dressing::retarget::Retargeting;
-use crate::dressing::source_body::SourceBody;
-use crate::dressing::suggest::Suggestion;
-use crate::formats::obj::ObjMesh;
-use crate::formats::sewn_obj::SewnObj;
-use crate::garment::import::{read_mesh, split};
-use crate::garment::{FabricImage, GarmentError, GarmentKind, GarmentMesh, Material, Size};
-use crate::math::P3;
-use crate::mesh::TriMesh;
+use crate::body_sections::BodySections;
+use crate::error::MeshGarmentError;
+use crate::finished::FinishedGarment;
+use crate::retarget::Retargeting;
+use crate::source_body::SourceBody;
+use crate::suggest::Suggestion;
 use std::path::Path;
 use std::sync::Arc;
+use tryon_body::Template;
+use tryon_body::measure::Measurements;
+use tryon_formats::obj::ObjMesh;
+use tryon_formats::sewn_obj::SewnObj;
+use tryon_garment::import::{read_mesh, split};
+use tryon_garment::{FabricImage, GarmentError, GarmentKind, GarmentMesh, Material, Size};
+use tryon_geometry::math::P3;
+use tryon_geometry::mesh::TriMesh;
 
-/// A garment file and the body that it was made on, ready for [`dress_all`](crate::dressing::dress_all).
+/// A garment file and the body that it was made on, ready for [`dress_all`](crate::dress_all).
 #[derive(Clone, Debug)]
 pub struct MeshGarment {
     /// Name of the file, or of the clothes in it.
@@ -194,7 +194,7 @@ impl MeshGarment {
         self.finished_in(self.size?)
     }
     /// Measures in a size.
-    pub(in crate::dressing) fn finished_in(&self, size: Size) -> Option<FinishedGarment> {
+    pub(crate) fn finished_in(&self, size: Size) -> Option<FinishedGarment> {
         let finished = self.sizing.as_ref()?.finished(size);
         Some(FinishedGarment {
             name: self.name.clone(),
@@ -236,7 +236,7 @@ impl MeshGarment {
         self.pieces.iter().map(|p| p.garment.vertices).sum()
     }
     /// The pieces on another body, innermost first: meshes, and positions in the canonical pose (m).
-    pub(in crate::dressing) fn retargeted(
+    pub(crate) fn retargeted(
         &self,
         template: &Template,
         sections: &BodySections,

@@ -2,14 +2,14 @@
 
 use super::grading::{Grading, LimbAxes};
 use super::piece::GarmentPiece;
-use crate::body::measure::{Measurements, measure};
-use crate::body::parts::vertex_masks;
-use crate::body::{BodyShape, Template};
-use crate::dressing::body_sections::{BodySections, SectionStack};
-use crate::dressing::finished::{FinishedGarment, HangsFrom, Hem, LEAST_EASE};
-use crate::dressing::suggest::{Suggestion, body_girths, first_with_ease};
-use crate::garment::{GarmentKind, Material, Region, Size};
-use crate::math::P3;
+use crate::body_sections::{BodySections, SectionStack};
+use crate::finished::{FinishedGarment, HangsFrom, Hem, LEAST_EASE};
+use crate::suggest::{Suggestion, body_girths, first_with_ease};
+use tryon_body::measure::{Measurements, measure};
+use tryon_body::parts::vertex_masks;
+use tryon_body::{BodyShape, Template};
+use tryon_garment::{GarmentKind, Material, Region, Size};
+use tryon_geometry::math::P3;
 
 /// Trunk and legs: the skin of the girths at waist and hip.
 const BELOW: Region = Region::TRUNK.with(super::classifier::LEGS);
@@ -208,12 +208,12 @@ impl Stacks {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::body::embedded;
-    use crate::dressing::{FitClass, MeshGarment, SourceBody};
-    use crate::garment::size_table;
-    use crate::mesh::TriMesh;
+    use crate::{FitClass, MeshGarment, SourceBody};
     use std::f32::consts::TAU;
     use std::sync::Arc;
+    use tryon_body::embedded;
+    use tryon_garment::size_table;
+    use tryon_geometry::mesh::TriMesh;
 
     /// A tube around trunk and hips of the embedded body, 30 cm across.
     fn tube(body: &Arc<Template>) -> MeshGarment {

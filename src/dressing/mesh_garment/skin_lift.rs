@@ -1,9 +1,9 @@
 //! Least height of cloth above the skin: a rest shape taken below it would be too tight for good.
 
-use crate::body::Template;
-use crate::dressing::skin_binding::skin_normals;
-use crate::math::{P3, V3};
-use crate::spatial::PointTree;
+use crate::skin_binding::skin_normals;
+use tryon_body::Template;
+use tryon_geometry::math::{P3, V3};
+use tryon_geometry::spatial::PointTree;
 
 /// Least height of cloth above the skin at the start, metres.
 const ABOVE: f32 = 0.006;

@@ -1,10 +1,10 @@
 //! Orientation, texture coordinates and joint weights of a piece of cloth.
 
-use crate::body::Template;
-use crate::dressing::skin_binding::SkinBinding;
-use crate::garment::GarmentMesh;
-use crate::math::{P3, V3};
-use crate::mesh::face_normal;
+use crate::skin_binding::SkinBinding;
+use tryon_body::Template;
+use tryon_garment::GarmentMesh;
+use tryon_geometry::math::{P3, V3};
+use tryon_geometry::mesh::face_normal;
 
 /// Radius at which unrolled texture coordinates are lengths, metres: about a trunk's.
 const UNROLL_RADIUS: f32 = 0.15;

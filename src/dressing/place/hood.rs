@@ -3,8 +3,8 @@
 use super::outline::sample_edges;
 use super::placed_body::{PlacedBody, sign};
 use super::tube::{CLEARANCE, quarter_circle};
-use crate::garment::{Panel, Side};
-use crate::math::P3;
+use tryon_garment::{Panel, Side};
+use tryon_geometry::math::P3;
 
 /// Angle by which a hood lies back, radians; with less its back turns inside out.
 const RECLINE: f32 = 2.5;

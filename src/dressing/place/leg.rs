@@ -3,11 +3,11 @@
 use super::outline::PanelOutline;
 use super::placed_body::{PlacedBody, ends, sign};
 use super::tube::{Ellipse, HALF_PANELS};
-use crate::dressing::body_sections::BodySections;
-use crate::dressing::finished::{CROTCH_CLEARANCE, DEFAULT_RISE};
-use crate::garment::{Panel, Side};
-use crate::math::P3;
+use crate::body_sections::BodySections;
+use crate::finished::{CROTCH_CLEARANCE, DEFAULT_RISE};
 use std::f32::consts::{FRAC_PI_2, PI};
+use tryon_garment::{Panel, Side};
+use tryon_geometry::math::P3;
 
 /// Least distance of a trouser leg from the sagittal plane, metres: closer, the legs start in each other.
 const INSEAM_GAP: f32 = 0.001;

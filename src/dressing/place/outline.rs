@@ -1,6 +1,6 @@
 //! The sampled outline of a panel, queried by rows.
 
-use crate::garment::Panel;
+use tryon_garment::Panel;
 
 /// Chords of one edge of the outline; fewer cut the corners off necklines.
 const CHORDS: usize = 12;

@@ -6,13 +6,13 @@ use super::placed_body::PlacedBody;
 use super::skirt::SkirtChart;
 use super::sleeve::SleeveChart;
 use super::trunk::TrunkChart;
-use crate::body::Template;
-use crate::dressing::body_sections::BodySections;
-use crate::garment::{GarmentMesh, Panel, Pattern, Placement};
-use crate::math::{P3, V3};
+use crate::body_sections::BodySections;
+use tryon_body::Template;
+use tryon_garment::{GarmentMesh, Panel, Pattern, Placement};
+use tryon_geometry::math::{P3, V3};
 
 /// Start positions of the simulation vertices, frame of the canonical body (root identity), metres.
-pub(in crate::dressing) fn place(
+pub(crate) fn place(
     template: &Template,
     sections: &BodySections,
     pattern: &Pattern,
@@ -77,8 +77,8 @@ impl<'a> PanelChart<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::body::{BodyShape, embedded};
-    use crate::garment::{Size, Triangulation, library};
+    use tryon_body::{BodyShape, embedded};
+    use tryon_garment::{Size, Triangulation, library};
 
     #[test]
     fn charts_of_panels_meet_at_their_seams() {

@@ -1,9 +1,9 @@
 //! A pattern's shoulder seams on a body: they fix the height of every panel above the waist.
 
-use crate::body::Template;
-use crate::body::parts::BodySegment;
-use crate::dressing::body_sections::BodySections;
-use crate::garment::{Panel, Pattern, Placement, Side};
+use crate::body_sections::BodySections;
+use tryon_body::Template;
+use tryon_body::parts::BodySegment;
+use tryon_garment::{Panel, Pattern, Placement, Side};
 
 /// Neck and tip end of a shoulder seam where a pattern has none, panel coordinates, metres (library T-shirt, M).
 const DEFAULT_SEAM: [[f64; 2]; 2] = [[0.08, 0.0], [0.2, -0.04]];

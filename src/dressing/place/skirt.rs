@@ -3,10 +3,10 @@
 use super::outline::{PanelOutline, sample_edges};
 use super::placed_body::PlacedBody;
 use super::tube::{Ellipse, HALF_PANELS};
-use crate::dressing::body_sections::BodySections;
-use crate::garment::{Curve, Panel};
-use crate::math::P3;
+use crate::body_sections::BodySections;
 use std::f32::consts::FRAC_PI_2;
+use tryon_garment::{Curve, Panel};
+use tryon_geometry::math::P3;
 
 /// Chords of one waist edge.
 const CHORDS: usize = 8;

@@ -3,10 +3,10 @@
 use super::outline::PanelOutline;
 use super::placed_body::{PlacedBody, sign};
 use super::tube::CLEARANCE;
-use crate::dressing::body_sections::BodySections;
-use crate::garment::{Panel, Region, Side};
-use crate::math::{P3, V3};
+use crate::body_sections::BodySections;
 use std::f32::consts::PI;
+use tryon_garment::{Panel, Region, Side};
+use tryon_geometry::math::{P3, V3};
 
 /// Distance between the stations at which an arm is measured, metres.
 const STATION: f32 = 0.01;

@@ -3,10 +3,10 @@
 use super::outline::PanelOutline;
 use super::placed_body::{PlacedBody, ends};
 use super::tube::{Ellipse, HALF_PANELS, quarter_circle};
-use crate::dressing::body_sections::BodySections;
-use crate::garment::Panel;
-use crate::math::P3;
+use crate::body_sections::BodySections;
 use std::f32::consts::FRAC_PI_2;
+use tryon_garment::Panel;
+use tryon_geometry::math::P3;
 
 /// Depth over which a shirt turns over the shoulder, metres: less makes a sharp crease there.
 const SHOULDER_DEPTH: f32 = 0.10;

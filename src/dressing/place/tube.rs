@@ -1,8 +1,8 @@
 //! Elliptic tubes around cross-sections of the body.
 
-use crate::dressing::body_sections::CrossSection;
-use crate::math::P3;
+use crate::body_sections::CrossSection;
 use std::f32::consts::PI;
+use tryon_geometry::math::P3;
 
 /// Clearance between body and cloth at the start, metres: less starts inside the skin, more falls farther.
 pub(super) const CLEARANCE: f32 = 0.015;

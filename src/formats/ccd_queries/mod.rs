@@ -7,11 +7,11 @@
 mod rational;
 
 use super::FormatError;
-use crate::math::V3d;
 use rational::round_ratio;
 use std::fs::File;
 use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
+use tryon_geometry::math::V3d;
 
 /// Folder of vertex–face files.
 const VERTEX_FACE: &str = "vertex-face";

@@ -1,7 +1,7 @@
 //! Rows of glTF accessors. Each accessor is checked against the size of its buffer before it is read.
 
 use super::uri::external;
-use crate::formats::FormatError;
+use crate::FormatError;
 use ::gltf::accessor::{DataType, Dimensions};
 use ::gltf::buffer::{Source, View};
 use ::gltf::{Accessor, Document};

@@ -3,15 +3,15 @@
 use super::accessors::Accessors;
 use super::srgb::{encoded, linear};
 use super::uri::external;
-use crate::camera::ColorImage;
-use crate::formats::TexturePoint;
-use crate::formats::image::{decode_color, sample_texture};
-use crate::formats::texture_points::TexturePoints;
-use crate::math::P3;
-use crate::mesh::Face;
+use crate::TexturePoint;
+use crate::image::{decode_color, sample_texture};
+use crate::texture_points::TexturePoints;
 use ::gltf::{Document, Primitive, Semantic};
 use std::borrow::Cow;
 use std::path::Path;
+use tryon_geometry::camera::ColorImage;
+use tryon_geometry::math::P3;
+use tryon_geometry::mesh::Face;
 
 /// Reader of base colours; keeps the last texture, which neighbouring primitives share.
 pub(super) struct BaseColors<'a> {

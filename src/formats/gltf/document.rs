@@ -1,10 +1,10 @@
 //! Binary glTF under construction: the binary chunk and the JSON objects that describe it.
 
 use super::srgb::linear;
-use crate::formats::FormatError;
-use crate::mesh::Face;
+use crate::FormatError;
 use serde_json::{Value, json};
 use std::path::Path;
+use tryon_geometry::mesh::Face;
 
 /// Component type of 32-bit floats.
 const FLOAT: u32 = 5126;

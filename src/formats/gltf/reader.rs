@@ -3,17 +3,17 @@
 use super::accessors::Accessors;
 use super::base_colors::BaseColors;
 use super::uri::MAX_BYTES;
-use crate::formats::FormatError;
-use crate::formats::TexturePoint;
-use crate::formats::image::read_limited;
-use crate::math::P3;
-use crate::mesh::{Face, MeshError, TriMesh};
+use crate::FormatError;
+use crate::TexturePoint;
+use crate::image::read_limited;
 use ::gltf::accessor::DataType;
 use ::gltf::mesh::Mode;
 use ::gltf::{Document, Gltf, Node, Primitive, Semantic};
 use nalgebra::Matrix4;
 use std::ops::Range;
 use std::path::Path;
+use tryon_geometry::math::P3;
+use tryon_geometry::mesh::{Face, MeshError, TriMesh};
 
 /// Deepest scene; deeper ones are cycles.
 const MAX_DEPTH: usize = 64;
@@ -47,15 +47,15 @@ pub struct GltfPart {
 }
 
 /// Scene as stored: positions may be non-finite and faces degenerate; indices are in range.
-pub(in crate::formats) struct GltfScan {
+pub(crate) struct GltfScan {
     /// Positions of all primitives, node transforms applied.
-    pub(in crate::formats) points: Vec<P3>,
+    pub(crate) points: Vec<P3>,
     /// Triangles.
-    pub(in crate::formats) faces: Vec<Face>,
+    pub(crate) faces: Vec<Face>,
     /// Base colours, sRGB, 0 to 255, shape `[points]`; NaN where a primitive has none.
-    pub(in crate::formats) colors: Vec<[f32; 3]>,
+    pub(crate) colors: Vec<[f32; 3]>,
     /// Colours of the textures between the vertices.
-    pub(in crate::formats) texture: Vec<TexturePoint>,
+    pub(crate) texture: Vec<TexturePoint>,
 }
 
 /// Triangles read so far, and the buffers they come from.
@@ -108,7 +108,7 @@ pub fn parse_gltf(bytes: &[u8], origin: &Path) -> Result<GltfModel, FormatError>
 ///
 /// # Errors
 /// As [`read_glb`], except for positions that are not finite and degenerate faces; names a texture that is missing.
-pub(in crate::formats) fn read_gltf_scan(path: &Path) -> Result<GltfScan, FormatError> {
+pub(crate) fn read_gltf_scan(path: &Path) -> Result<GltfScan, FormatError> {
     let (document, accessors) = open(&read_limited(path, MAX_BYTES)?, path)?;
     let mut file = SceneReader::new(path, &accessors);
     file.base_colors = Some(BaseColors::new(path, &document, &accessors));

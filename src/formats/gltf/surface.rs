@@ -1,12 +1,12 @@
 //! Surface of one mesh to write: positions, normals, texture coordinates and triangles.
 
 use super::document::GlbDocument;
-use crate::formats::FormatError;
-use crate::math::{P3, V3};
-use crate::mesh::{Face, face_normal};
+use crate::FormatError;
 use serde_json::{Value, json};
 use std::collections::HashMap;
 use std::path::Path;
+use tryon_geometry::math::{P3, V3};
+use tryon_geometry::mesh::{Face, face_normal};
 
 /// Mesh to write: corners share position and texture coordinate. Metres, y up.
 #[derive(Clone, Copy, Debug)]

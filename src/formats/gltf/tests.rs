@@ -1,9 +1,9 @@
 use super::*;
-use crate::camera::ColorImage;
-use crate::formats::image::encode_png_rgb;
-use crate::math::P3;
-use crate::mesh::Face;
+use crate::image::encode_png_rgb;
 use std::path::Path;
+use tryon_geometry::camera::ColorImage;
+use tryon_geometry::math::P3;
+use tryon_geometry::mesh::Face;
 
 const CORNERS: [[f32; 3]; 4] = [
     [0.0, 0.0, 0.0],
@@ -20,7 +20,7 @@ fn points() -> Vec<P3> {
 }
 
 /// A shirt and a skirt, both tetrahedra.
-fn encoded(frames: &[Vec<Vec<P3>>]) -> Result<Vec<u8>, crate::formats::FormatError> {
+fn encoded(frames: &[Vec<Vec<P3>>]) -> Result<Vec<u8>, crate::FormatError> {
     let p = points();
     let shirt = GlbMesh {
         name: "shirt",
@@ -145,7 +145,7 @@ fn faults_name_mesh_and_index() {
 }
 
 /// A square whose texture has the colours of its corners in four pixels.
-fn textured(png: &[u8]) -> Result<Vec<u8>, crate::formats::FormatError> {
+fn textured(png: &[u8]) -> Result<Vec<u8>, crate::FormatError> {
     let corners = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]];
     let vertices = corners.map(|[x, y]| P3::new(x, 1.0 - y, 0.0));
     let square = GlbMesh {

@@ -1,8 +1,8 @@
 //! Bytes that a glTF URI names: data URIs and files beside the document.
 
-use crate::formats::FormatError;
-use crate::formats::image::read_limited;
-use crate::formats::sibling::sibling;
+use crate::FormatError;
+use crate::image::read_limited;
+use crate::sibling::sibling;
 use std::path::Path;
 
 /// Largest file; a garment of 100,000 vertices takes 4 MB without its textures.

@@ -2,10 +2,10 @@
 
 use super::document::GlbDocument;
 use super::surface::{GlbMesh, is_finite};
-use crate::formats::FormatError;
-use crate::math::P3;
+use crate::FormatError;
 use serde_json::{Value, json};
 use std::path::Path;
+use tryon_geometry::math::P3;
 
 /// Encodes meshes as a `.glb`. `frames` holds the positions of each mesh over time, shape `[meshes][frames][vertices]`,
 /// `frame_seconds` apart; empty (or too short) for static meshes.

@@ -5,9 +5,9 @@
 //! Smaller and faster than plain zstd and than RVL (docs/benchmarks).
 
 use super::limits::check_size;
-use crate::camera::DepthImage;
-use crate::formats::FormatError;
+use crate::FormatError;
 use std::path::Path;
+use tryon_geometry::camera::DepthImage;
 
 const MAGIC: &[u8; 4] = b"TDZ1";
 const HEADER: usize = 12;

@@ -3,9 +3,9 @@
 use super::jpeg::decode_jpeg_from;
 use super::limits::{MAX_FILE_BYTES, read_limited};
 use super::png_file::{decode_png_color, decode_png_depth, encode_png_depth, encode_png_rgb};
-use crate::camera::{ColorImage, DepthImage};
-use crate::formats::FormatError;
+use crate::FormatError;
 use std::path::Path;
+use tryon_geometry::camera::{ColorImage, DepthImage};
 
 /// Reads a 16-bit grey PNG; values in the file's own unit.
 ///

@@ -1,10 +1,10 @@
 //! JPEG for colour on the wire and in recordings.
 
 use super::limits::{MAX_SIDE, check_size};
-use crate::camera::ColorImage;
-use crate::formats::FormatError;
+use crate::FormatError;
 use jpeg_encoder::{ColorType, Encoder, SamplingFactor};
 use std::path::Path;
+use tryon_geometry::camera::ColorImage;
 use zune_jpeg::JpegDecoder;
 use zune_jpeg::zune_core::bytestream::ZCursor;
 use zune_jpeg::zune_core::colorspace::ColorSpace;

@@ -1,11 +1,11 @@
 //! Limits of image sizes and of file sizes, checked before anything is allocated.
 
-use crate::formats::FormatError;
+use crate::FormatError;
 use std::fs::File;
 use std::io::Read;
 use std::path::Path;
 
-/// Longest side of an image, pixels: that of [`crate::camera::Intrinsics`].
+/// Longest side of an image, pixels: that of [`tryon_geometry::camera::Intrinsics`].
 pub const MAX_SIDE: u32 = 16_384;
 
 /// Most pixels of an image: five times the largest depth-and-colour camera on sale, 200 MB as colour.
@@ -15,11 +15,7 @@ pub const MAX_PIXELS: u64 = 1 << 26;
 pub(super) const MAX_FILE_BYTES: u64 = 4 * MAX_PIXELS;
 
 /// Checks the size of an image against [`MAX_SIDE`] and [`MAX_PIXELS`].
-pub(in crate::formats) fn check_size(
-    origin: &Path,
-    width: u32,
-    height: u32,
-) -> Result<(), FormatError> {
+pub(crate) fn check_size(origin: &Path, width: u32, height: u32) -> Result<(), FormatError> {
     for (field, side) in [("width", width), ("height", height)] {
         if side == 0 || side > MAX_SIDE {
             return Err(FormatError::field(
@@ -37,7 +33,7 @@ pub(in crate::formats) fn check_size(
 }
 
 /// Reads a whole file of at most `limit` bytes.
-pub(in crate::formats) fn read_limited(path: &Path, limit: u64) -> Result<Vec<u8>, FormatError> {
+pub(crate) fn read_limited(path: &Path, limit: u64) -> Result<Vec<u8>, FormatError> {
     let io = |e| FormatError::io(path, e);
     let file = File::open(path).map_err(io)?;
     let size = file.metadata().map_err(io)?.len();

@@ -1,14 +1,14 @@
 //! PNG: 16-bit grey for depth, 8-bit for colour.
 
 use super::limits::check_size;
-use crate::camera::{ColorImage, DepthImage};
-use crate::formats::FormatError;
+use crate::FormatError;
 use png::{
     BitDepth, ColorType, Compression, Decoder, DecodingError, Encoder, Limits, Reader,
     Transformations,
 };
 use std::io::Cursor;
 use std::path::Path;
+use tryon_geometry::camera::{ColorImage, DepthImage};
 
 /// Memory of the decoder besides the image, bytes: chunks such as colour profiles, and a few rows.
 const DECODER_BYTES: usize = 16 << 20;

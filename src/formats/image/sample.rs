@@ -1,6 +1,6 @@
 //! Bilinear samples of a texture.
 
-use crate::camera::ColorImage;
+use tryon_geometry::camera::ColorImage;
 
 /// Colour at texture coordinates with v down, 0 to 255; `None` for coordinates that are not finite.
 ///

@@ -1,12 +1,12 @@
 //! Messages of an MCAP recording: depth, colour, calibration and transforms.
 
-use crate::camera::{ColorImage, DepthImage, ImageError};
-use crate::formats::FormatError;
-use crate::formats::foxglove::{
+use crate::FormatError;
+use crate::foxglove::{
     CameraCalibration, CompressedImage, FoxgloveMessage, FrameTransform, RawImage, decode,
 };
-use crate::formats::image::{check_size, decode_color};
+use crate::image::{check_size, decode_color};
 use std::path::Path;
+use tryon_geometry::camera::{ColorImage, DepthImage, ImageError};
 
 /// Content of a message that matters to RGBD frames.
 pub(super) enum MessageItem {

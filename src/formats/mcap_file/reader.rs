@@ -2,11 +2,9 @@
 
 use super::message::{MessageContext, MessageItem};
 use super::record::McapRecord;
-use crate::camera::{Calibration, ColorImage, Intrinsics, RgbdFrame};
-use crate::formats::FormatError;
-use crate::formats::foxglove::{CameraCalibration, FrameTransform};
-use crate::formats::rgbd_source::RgbdSource;
-use crate::math::{Camera, ColorCamera, Rigid};
+use crate::FormatError;
+use crate::foxglove::{CameraCalibration, FrameTransform};
+use crate::rgbd_source::RgbdSource;
 use mcap::McapError;
 use mcap::sans_io::linear_reader::{LinearReadEvent, LinearReader, LinearReaderOptions};
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
@@ -14,6 +12,8 @@ use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::{BufReader, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
+use tryon_geometry::camera::{Calibration, ColorImage, Intrinsics, RgbdFrame};
+use tryon_geometry::math::{Camera, ColorCamera, Rigid};
 
 /// Largest record, bytes: an uncompressed colour image of 4096 × 4096 has 48 MiB. A greater length is refused before
 /// anything is allocated.

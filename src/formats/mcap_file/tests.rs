@@ -1,10 +1,10 @@
 use super::*;
-use crate::camera::{Calibration, ColorImage, DepthImage, Intrinsics, RgbdFrame};
-use crate::formats::{RgbdSource, open_recording};
-use crate::math::Rigid;
+use crate::{RgbdSource, open_recording};
 use nalgebra::{UnitQuaternion, Vector3};
 use std::fs;
 use std::path::Path;
+use tryon_geometry::camera::{Calibration, ColorImage, DepthImage, Intrinsics, RgbdFrame};
+use tryon_geometry::math::Rigid;
 
 const TINY: Intrinsics = Intrinsics {
     width: 32,

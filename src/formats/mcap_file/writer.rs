@@ -1,17 +1,17 @@
 //! Streams frames into an MCAP file.
 
-use crate::camera::{Calibration, Intrinsics, RgbdFrame};
-use crate::formats::foxglove::{
+use crate::foxglove::{
     CameraCalibration, CompressedImage, FrameTransform, Quaternion, RawImage, Vector3, encode,
     schema, timestamp,
 };
-use crate::formats::{FormatError, image, private_file};
+use crate::{FormatError, image, private_file};
 use mcap::records::MessageHeader;
 use mcap::{Compression, McapError, WriteOptions, Writer};
 use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::BufWriter;
 use std::path::{Path, PathBuf};
+use tryon_geometry::camera::{Calibration, Intrinsics, RgbdFrame};
 
 /// JPEG quality of colour: 35 kB a VGA image.
 const JPEG_QUALITY: u8 = 85;

@@ -1,13 +1,13 @@
 //! `camera.json`: `{width, height, fx, fy, cx, cy, depth_scale}` and, for a separate colour camera,
 //! `color: {width, height, fx, fy, cx, cy}` and `color_from_depth: {translation: [x, y, z], rotation: [x, y, z, w]}`.
 
-use crate::camera::{Calibration, Intrinsics};
-use crate::formats::FormatError;
-use crate::formats::image::read_limited;
-use crate::math::Rigid;
+use crate::FormatError;
+use crate::image::read_limited;
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 use serde_json::{Map, Value, json};
 use std::path::Path;
+use tryon_geometry::camera::{Calibration, Intrinsics};
+use tryon_geometry::math::Rigid;
 
 /// Largest file, bytes; a calibration has a few hundred.
 const MAX_BYTES: u64 = 1 << 20;

@@ -1,7 +1,7 @@
 //! Files of each frame, by time lists or by name.
 
-use crate::formats::FormatError;
-use crate::formats::image::read_limited;
+use crate::FormatError;
+use crate::image::read_limited;
 use std::path::Path;
 
 /// Largest time list, bytes; a day at 30 Hz has 180 MB.

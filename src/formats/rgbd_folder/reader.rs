@@ -2,11 +2,11 @@
 
 use super::camera_json::CameraFile;
 use super::index::{Entry, entries};
-use crate::camera::{Calibration, DepthImage, Intrinsics, RgbdFrame};
-use crate::formats::FormatError;
-use crate::formats::image::{read_color, read_png_depth};
-use crate::formats::rgbd_source::RgbdSource;
+use crate::FormatError;
+use crate::image::{read_color, read_png_depth};
+use crate::rgbd_source::RgbdSource;
 use std::path::{Path, PathBuf};
+use tryon_geometry::camera::{Calibration, DepthImage, Intrinsics, RgbdFrame};
 
 /// An RGBD folder, read frame by frame.
 #[derive(Debug)]

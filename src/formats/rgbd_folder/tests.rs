@@ -1,10 +1,10 @@
 use super::*;
-use crate::camera::{Calibration, ColorImage, DepthImage, Intrinsics, RgbdFrame};
-use crate::formats::RgbdSource;
-use crate::formats::image::write_png_depth;
-use crate::math::Rigid;
+use crate::RgbdSource;
+use crate::image::write_png_depth;
 use nalgebra::{UnitQuaternion, Vector3};
 use std::fs;
+use tryon_geometry::camera::{Calibration, ColorImage, DepthImage, Intrinsics, RgbdFrame};
+use tryon_geometry::math::Rigid;
 
 const TINY: Intrinsics = Intrinsics {
     width: 4,
@@ -63,7 +63,7 @@ fn written_frames_read_back() {
     // Colour is missing in the middle.
     let frames: Vec<RgbdFrame> = (0..4).map(|i| frame(i, i != 2)).collect();
     frames.iter().for_each(|f| w.write(f).expect("written"));
-    let mut r = crate::formats::open_recording(dir.path()).expect("opens");
+    let mut r = crate::open_recording(dir.path()).expect("opens");
     assert_eq!(r.len(), Some(4));
     let k = r.calibration();
     assert_eq!((k.depth, k.color), (TINY, Some(TINY)));
@@ -181,7 +181,7 @@ fn reading_continues_after_a_bad_frame() {
 
 #[test]
 fn shared_recordings_open() {
-    let Some(root) = crate::formats::shared_data("") else {
+    let Some(root) = crate::shared_data("") else {
         return;
     };
     for (name, frames, color) in [
@@ -190,7 +190,7 @@ fn shared_recordings_open() {
         ("rgbd/itop_still_320x240", 1, false),
         ("sequences/jacks_f_avg_kinect1_room", 180, false),
     ] {
-        let mut r = crate::formats::open_recording(&root.join(name)).expect(name);
+        let mut r = crate::open_recording(&root.join(name)).expect(name);
         assert_eq!(r.len(), Some(frames), "{name}");
         let f = r.next_frame().expect(name).expect(name);
         assert_eq!(f.color.is_some(), color, "{name}");

@@ -1,12 +1,12 @@
 //! Writes an RGBD folder frame by frame.
 
 use super::camera_json::CameraFile;
-use crate::camera::{Calibration, RgbdFrame};
-use crate::formats::image::{encode_png_depth, encode_png_rgb};
-use crate::formats::{FormatError, private_file};
+use crate::image::{encode_png_depth, encode_png_rgb};
+use crate::{FormatError, private_file};
 use std::fs::File;
 use std::io::Write;
 use std::path::{Path, PathBuf};
+use tryon_geometry::camera::{Calibration, RgbdFrame};
 
 fn create(path: &Path) -> Result<File, FormatError> {
     private_file::create(path).map_err(|e| FormatError::io(path, e))

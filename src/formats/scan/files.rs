@@ -4,7 +4,7 @@ use super::gltf::read_scene;
 use super::mesh::ScanMesh;
 use super::obj::read_obj_scan;
 use super::ply::read_ply;
-use crate::formats::FormatError;
+use crate::FormatError;
 use std::cmp::Ordering;
 use std::path::{Path, PathBuf};
 

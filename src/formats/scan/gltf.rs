@@ -2,8 +2,8 @@
 
 use super::colors::quantized;
 use super::mesh::ScanMesh;
-use crate::formats::FormatError;
-use crate::formats::gltf::read_gltf_scan;
+use crate::FormatError;
+use crate::gltf::read_gltf_scan;
 use std::path::Path;
 
 /// Reads a `.gltf` or `.glb` scan.

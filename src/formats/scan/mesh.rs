@@ -1,8 +1,8 @@
 //! Triangle mesh of a coloured scan, as its file stores it.
 
-use crate::formats::TexturePoint;
-use crate::math::{P3, V3};
-use crate::mesh::Face;
+use crate::TexturePoint;
+use tryon_geometry::math::{P3, V3};
+use tryon_geometry::mesh::Face;
 
 /// Coloured scan in the units and axes of its file.
 ///

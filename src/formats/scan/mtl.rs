@@ -1,8 +1,8 @@
 //! Material libraries of OBJ files: diffuse colour and texture.
 
-use crate::formats::FormatError;
-use crate::formats::image::read_limited;
-use crate::formats::sibling::sibling;
+use crate::FormatError;
+use crate::image::read_limited;
+use crate::sibling::sibling;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 

@@ -3,9 +3,9 @@
 use super::colors::{is_finite, quantized, white};
 use super::mesh::ScanMesh;
 use super::texture::corner_colors;
-use crate::formats::FormatError;
-use crate::formats::image::read_limited;
-use crate::formats::obj_records::{ObjFaults, parse_records};
+use crate::FormatError;
+use crate::image::read_limited;
+use crate::obj_records::{ObjFaults, parse_records};
 use std::path::Path;
 
 /// Largest OBJ scan, bytes; a scan of 5 million vertices takes about 1 GB.

@@ -1,11 +1,11 @@
 //! Vertex colours from the materials of an OBJ file: means over face corners.
 
 use super::mtl::{MtlMaterial, read_libraries};
-use crate::formats::FormatError;
-use crate::formats::TexturePoint;
-use crate::formats::image::{read_color, sample_texture};
-use crate::formats::obj_records::ObjRecords;
-use crate::formats::texture_points::TexturePoints;
+use crate::FormatError;
+use crate::TexturePoint;
+use crate::image::{read_color, sample_texture};
+use crate::obj_records::ObjRecords;
+use crate::texture_points::TexturePoints;
 use std::collections::BTreeSet;
 use std::path::Path;
 

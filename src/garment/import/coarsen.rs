@@ -2,10 +2,10 @@
 //!
 //! Edges are collapsed in the flat panels, so that rest shapes stay exact, and along both sides of a seam at once.
 
-use crate::garment::{GarmentMesh, RenderMesh};
-use crate::math::P3;
-use crate::mesh::Face;
+use crate::{GarmentMesh, RenderMesh};
 use std::collections::{BTreeMap, BTreeSet};
+use tryon_geometry::math::P3;
+use tryon_geometry::mesh::Face;
 
 /// Edges shorter than this times the target are collapsed (Botsch & Kobbelt 2004).
 const COLLAPSE: f64 = 4.0 / 5.0;
@@ -297,7 +297,7 @@ fn rebuilt(g: &GarmentMesh, positions: &[P3], c: &Coarsener) -> (GarmentMesh, Ve
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::garment::{Size, Triangulation, library, rest_area};
+    use crate::{Size, Triangulation, library, rest_area};
 
     #[test]
     fn panels_keep_their_area_seams_and_holes_with_a_tenth_of_the_vertices() {

@@ -1,15 +1,15 @@
 //! Mesh files as surfaces of cloth: OBJ with or without stitches, glTF, MakeHuman clothes.
 
-use crate::formats::FormatError;
-use crate::formats::gltf::{GltfModel, read_glb};
-use crate::formats::mhclo::read_mhclo;
-use crate::formats::obj::{ObjMesh, read_obj};
-use crate::formats::sewn_obj::{SewnObj, Stitch, read_sewn_obj};
-use crate::garment::union_find::UnionFind;
-use crate::math::P3;
-use crate::mesh::{Face, TriMesh};
+use crate::union_find::UnionFind;
 use std::collections::BTreeMap;
 use std::path::Path;
+use tryon_formats::FormatError;
+use tryon_formats::gltf::{GltfModel, read_glb};
+use tryon_formats::mhclo::read_mhclo;
+use tryon_formats::obj::{ObjMesh, read_obj};
+use tryon_formats::sewn_obj::{SewnObj, Stitch, read_sewn_obj};
+use tryon_geometry::math::P3;
+use tryon_geometry::mesh::{Face, TriMesh};
 
 /// Surface of a mesh file.
 #[derive(Clone, Debug, PartialEq)]
@@ -278,8 +278,8 @@ pub fn some_faces(sewn: &SewnObj, faces: &[usize]) -> Option<SewnObj> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::formats::obj::parse_obj;
-    use crate::mesh::Topology;
+    use tryon_formats::obj::parse_obj;
+    use tryon_geometry::mesh::Topology;
 
     fn obj(text: &str) -> ObjMesh {
         parse_obj(text, Path::new("t.obj")).expect("an OBJ")

@@ -1,10 +1,10 @@
 //! Patterns from GarmentCode: panels in the frames of their places on the body, landmark edges by name.
 
-use crate::formats::garmentcode::{RawCurve, RawEdge, RawPanel, RawPattern};
-use crate::garment::{
+use crate::{
     Anchor, Curve, GarmentError, GarmentKind, Material, Panel, PanelEdge, Pattern, Placement, Seam,
     Side, Size,
 };
+use tryon_formats::garmentcode::{RawCurve, RawEdge, RawPanel, RawPattern};
 
 /// Length below which an edge is removed together with its partner in a seam, metres: such edges come from seam
 /// arithmetic and give triangles a tenth as wide as the mesh.

@@ -1,12 +1,12 @@
 //! Mesh garments: rest shape from texture coordinates in metres, or from the triangles in space.
 
-use crate::formats::sewn_obj::{SewnObj, Stitch};
-use crate::garment::flat_triangle::{rest_area, smallest_angle, unfold};
-use crate::garment::union_find::UnionFind;
-use crate::garment::{GarmentError, GarmentKind, GarmentMesh, Material, Region, RenderMesh, Size};
-use crate::math::P3;
-use crate::mesh::{Face, Topology, TriMesh};
+use crate::flat_triangle::{rest_area, smallest_angle, unfold};
+use crate::union_find::UnionFind;
+use crate::{GarmentError, GarmentKind, GarmentMesh, Material, Region, RenderMesh, Size};
 use std::collections::{BTreeMap, BTreeSet};
+use tryon_formats::sewn_obj::{SewnObj, Stitch};
+use tryon_geometry::math::P3;
+use tryon_geometry::mesh::{Face, Topology, TriMesh};
 
 /// Garment from a mesh, with the positions of its vertices in the file.
 #[derive(Clone, Debug, PartialEq)]
@@ -280,8 +280,8 @@ fn seam_pairs(stitches: &[Stitch], welded: &[u32]) -> Vec<[u32; 2]> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::formats::sewn_obj::parse_sewn_obj;
     use std::path::Path;
+    use tryon_formats::sewn_obj::parse_sewn_obj;
 
     fn garment(text: &str) -> Result<ImportedMesh, GarmentError> {
         let o = parse_sewn_obj(text, Path::new("g.obj")).expect("an OBJ");

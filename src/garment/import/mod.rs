@@ -5,7 +5,7 @@ mod file;
 mod garmentcode;
 mod mesh;
 
-pub(crate) use super::flat_triangle::{unfold, widened};
+pub use super::flat_triangle::{unfold, widened};
 pub use coarsen::{coarsen, median_edge};
 pub use file::{MeshFile, read_mesh, some_faces, split};
 pub use garmentcode::from_garmentcode;

@@ -1,7 +1,7 @@
 //! Garments by name.
 
 use super::{dress, skirt, top, trousers};
-use crate::garment::{GarmentError, Pattern, Size, size_table};
+use crate::{GarmentError, Pattern, Size, size_table};
 
 /// Names of all garments, in display order.
 pub fn names() -> &'static [&'static str] {
@@ -67,7 +67,7 @@ pub fn pattern(name: &str, size: Size) -> Result<Pattern, GarmentError> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::garment::{GarmentMesh, Triangulation, rest_area};
+    use crate::{GarmentMesh, Triangulation, rest_area};
 
     /// Smallest angle of the library's triangles at the default edge length, degrees; measured 22.9° (T-shirt M).
     const MIN_ANGLE: f64 = 20.0;

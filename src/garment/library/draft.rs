@@ -1,6 +1,6 @@
 //! Drafting: panels from corners, mirror images and seams.
 
-use crate::garment::{Curve, Panel, PanelEdge, Placement, Seam};
+use crate::{Curve, Panel, PanelEdge, Placement, Seam};
 
 /// Name, start corner and shape of an edge.
 pub(super) type DraftEdge<'a> = (&'a str, [f64; 2], Curve);

@@ -3,7 +3,7 @@
 use super::draft::{flip, panel, sewn};
 use super::skirt::{DART_AT, HIP_DEPTH, Sector, darts, flare};
 use super::top::{SHOULDER_FALL, shoulders, trunk_seams, yoke};
-use crate::garment::{
+use crate::{
     Anchor, Curve, GarmentError, GarmentKind, Material, Panel, Pattern, Placement, SizeRow,
 };
 

@@ -1,7 +1,7 @@
 //! Skirts to the knee: flared (waist and hem on arcs) and straight (shaped by darts).
 
 use super::draft::{DraftEdge, flip, panel, sewn};
-use crate::garment::{
+use crate::{
     Anchor, Curve, Dart, GarmentError, GarmentKind, Material, Panel, Pattern, Placement, SizeRow,
 };
 

@@ -1,7 +1,7 @@
 //! Tops: T-shirt, long-sleeved shirt, tank top, hooded top.
 
 use super::draft::{DraftEdge, flip, mirrored, panel, sewn};
-use crate::garment::{
+use crate::{
     Anchor, Curve, GarmentError, GarmentKind, Material, Panel, Pattern, Placement, Seam, Side,
     SizeRow,
 };

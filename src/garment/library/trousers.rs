@@ -1,7 +1,7 @@
 //! Straight trousers and shorts: two fronts, two backs.
 
 use super::draft::{mirrored, panel, sewn};
-use crate::garment::{
+use crate::{
     Anchor, Curve, GarmentError, GarmentKind, Material, Panel, Pattern, Placement, Side, SizeRow,
 };
 

@@ -9,18 +9,18 @@ mod viewpoint;
 
 use super::clip::{ClipError, Performance};
 use super::stance::Rig;
-use crate::body::{BoneTransforms, RestBody, Template, skin};
-use crate::camera::DepthImage;
-use crate::formats::MotionClip;
-use crate::math::{P3, P3d, V3, V3d};
-use crate::par::Par;
-use crate::raster::{Cull, Options, View, VisibilityBuffer, rasterise_with};
-use crate::segment::part_forest::PersonCells;
-use crate::spatial::{Label, OrganisedCloud};
-use crate::tracking::{PartClasses, yaw_of_joints};
 use rand::{Rng, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 use std::sync::Arc;
+use tryon_body::{BoneTransforms, RestBody, Template, skin};
+use tryon_formats::MotionClip;
+use tryon_geometry::camera::DepthImage;
+use tryon_geometry::math::{P3, P3d, V3, V3d};
+use tryon_geometry::par::Par;
+use tryon_geometry::raster::{Cull, Options, View, VisibilityBuffer, rasterise_with};
+use tryon_geometry::spatial::{Label, OrganisedCloud};
+use tryon_tracking::segment::part_forest::PersonCells;
+use tryon_tracking::{PartClasses, yaw_of_joints};
 use viewpoint::Viewpoint;
 
 pub use training::{TrainingPlan, train_parts};
@@ -316,8 +316,8 @@ fn refine(cloud: &mut OrganisedCloud, image: &DepthImage, cells: &mut Vec<u32>) 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::body::embedded;
-    use crate::tracking::part_classes::PART_CLASSES;
+    use tryon_body::embedded;
+    use tryon_tracking::part_classes::PART_CLASSES;
 
     /// Largest distance of a part's skin from its anchor, metres: half a thigh under a wide coat.
     const PART_REACH: f64 = 0.45;

@@ -1,12 +1,12 @@
 //! Random people: shapes over the whole range, any stature, clothes and hair as bumps of the surface.
 
-use crate::body::{BodyShape, RestBody, Template, embedded};
-use crate::math::{P3, P3d};
-use crate::tracking::PartClasses;
-use crate::tracking::part_classes::{PartKind, kind_of};
 use rand::Rng;
 use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64Mcg;
+use tryon_body::{BodyShape, RestBody, Template, embedded};
+use tryon_geometry::math::{P3, P3d};
+use tryon_tracking::PartClasses;
+use tryon_tracking::part_classes::{PartKind, kind_of};
 
 /// Statures, metres.
 const STATURES: [f64; 2] = [1.45, 2.05];

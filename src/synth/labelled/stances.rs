@@ -1,14 +1,14 @@
 //! Random stances: key poses of arms, legs and torso, the try-on routine, and motion clips; mixed, with noise.
 
-use crate::body::Skeleton;
-use crate::math::{P3d, V3d, exp_so3};
-use crate::synth::clip::Performance;
-use crate::synth::routine::Routine;
-use crate::synth::stance::{Limb, Rig, Stance};
+use crate::clip::Performance;
+use crate::routine::Routine;
+use crate::stance::{Limb, Rig, Stance};
 use nalgebra::UnitQuaternion;
 use rand::Rng;
 use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64Mcg;
+use tryon_body::Skeleton;
+use tryon_geometry::math::{P3d, V3d, exp_so3};
 
 const fn v(x: f64, y: f64, z: f64) -> V3d {
     V3d::new(x, y, z)

@@ -1,11 +1,11 @@
 //! Training of the part forest on labelled frames.
 
 use super::{FRAMES_PER_PERSON, LabelledFrame, LabelledFrames};
-use crate::par::{self, Par};
-use crate::segment::part_forest::{CellLabel, ForestSpec, PartForest, TrainingSet, train};
-use crate::tracking::part_classes::PART_CLASSES;
 use rand::{Rng, SeedableRng};
 use rand_pcg::Pcg64Mcg;
+use tryon_geometry::par::{self, Par};
+use tryon_tracking::part_classes::PART_CLASSES;
+use tryon_tracking::segment::part_forest::{CellLabel, ForestSpec, PartForest, TrainingSet, train};
 
 /// Sizes of a training.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -1,10 +1,10 @@
 //! Random cameras: distance, height, tilt, roll, framing, resolution and noise.
 
-use crate::camera::{Intrinsics, NoiseModel};
-use crate::math::{Camera, Rigid, World};
-use crate::synth::Setting;
+use crate::Setting;
 use rand::Rng;
 use rand_pcg::Pcg64Mcg;
+use tryon_geometry::camera::{Intrinsics, NoiseModel};
+use tryon_geometry::math::{Camera, Rigid, World};
 
 /// Distances of whole bodies and of busts, metres.
 const DISTANCES: [[f64; 2]; 2] = [[1.5, 4.0], [0.8, 2.0]];

@@ -2,8 +2,9 @@
 
 use super::schedule::FitTerms;
 use super::scratch::{FitContext, FitScratch};
-use crate::body::Pose;
-use crate::math::P3d;
+use crate::TrackerModel;
+use crate::kinematics::linearise;
+use crate::limb::Limb;
 use crate::registration::residual::{
     ClearanceResidual, EdgeResidual, FloorPlane, FloorResidual, FloorWeights, FreeSpaceResidual,
     HandResidual, LimbMotion, PointTerm, Residual, RestPoseResidual, SurfaceMetric,
@@ -13,12 +14,11 @@ use crate::registration::{
     Dof, EdgeSide, NormalEquations, PairingConfig, PairingStats, ROOT_UNKNOWNS, pair_edges,
     pair_surfaces,
 };
-use crate::spatial::OrganisedCloud;
-use crate::tracking::TrackerModel;
-use crate::tracking::kinematics::linearise;
-use crate::tracking::limb::Limb;
-use crate::tracking::standing::planted;
+use crate::standing::planted;
 use nalgebra::Vector3;
+use tryon_body::Pose;
+use tryon_geometry::math::P3d;
+use tryon_geometry::spatial::OrganisedCloud;
 
 /// Smallest cosine between normals of a pair (Table 1: 60°).
 const COS_NORMAL: f32 = 0.5;
@@ -45,7 +45,7 @@ const CLEARANCE_WEIGHT: f64 = 1e-3;
 
 /// Sums over the pairs of the surface residual.
 #[derive(Clone, Copy, Debug, Default)]
-pub(in crate::tracking) struct PoseSums {
+pub(crate) struct PoseSums {
     /// Σ kernel weights.
     pub weight: f64,
     /// Σ kernel weight × distance along the normal, metres.
@@ -55,7 +55,7 @@ pub(in crate::tracking) struct PoseSums {
 }
 
 /// Poses the samples and pairs them with the readings.
-pub(in crate::tracking) fn pair(
+pub(crate) fn pair(
     context: &FitContext<'_>,
     pose: &Pose,
     distance: f32,
@@ -97,7 +97,7 @@ pub(in crate::tracking) fn pair(
 
 /// Visits the terms of all point residuals of the current pairs. `sigma` is the kernel's width, metres, `point_to_point`
 /// the weight of that distance beside the configured point-to-plane.
-pub(in crate::tracking) fn for_each_point(
+pub(crate) fn for_each_point(
     context: &FitContext<'_>,
     scratch: &FitScratch,
     sigma: f64,
@@ -148,7 +148,7 @@ pub(in crate::tracking) fn for_each_point(
 }
 
 /// Fills the normal equations at the paired pose, per point, with rest pose, floor and hands.
-pub(in crate::tracking) fn assemble(
+pub(crate) fn assemble(
     context: &FitContext<'_>,
     pose: &Pose,
     sigma: f64,
@@ -291,7 +291,7 @@ fn prior_weights(
 }
 
 /// Both legs over a floor.
-pub(in crate::tracking) struct FloorLegs<'a> {
+pub(crate) struct FloorLegs<'a> {
     pub model: &'a TrackerModel,
     pub grid: &'a OrganisedCloud,
     pub floor: &'a FloorPlane,
@@ -306,7 +306,7 @@ pub(in crate::tracking) struct FloorLegs<'a> {
 
 impl FloorLegs<'_> {
     /// Adds the floor residual of both legs to the equations.
-    pub(in crate::tracking) fn add_to(&self, equations: &mut NormalEquations) {
+    pub(crate) fn add_to(&self, equations: &mut NormalEquations) {
         for (leg, planted) in self.model.standing.iter().zip(self.feet) {
             let residual = FloorResidual {
                 foot: &leg.foot,

@@ -1,13 +1,13 @@
 //! Schedules and residual weights of the pose fit.
 
-use crate::math::P3d;
+use crate::TrackerConfig;
 use crate::registration::Association;
-use crate::tracking::TrackerConfig;
-use crate::tracking::standing::FloorStance;
+use crate::standing::FloorStance;
+use tryon_geometry::math::P3d;
 
 /// Iterations of one fit, and how its kernel and reach shrink.
 #[derive(Clone, Copy, Debug)]
-pub(in crate::tracking) struct Schedule {
+pub(crate) struct Schedule {
     /// Most iterations.
     pub iterations: usize,
     /// Shrinking iterations to skip, because the start is good already.
@@ -22,7 +22,7 @@ pub(in crate::tracking) struct Schedule {
 
 /// From frame to frame. The first distance is Table 1's 0.2 m less the share that prediction saves; the last is three
 /// times the residual of a body of wrong size.
-pub(in crate::tracking) const TRACK: Schedule = Schedule {
+pub(crate) const TRACK: Schedule = Schedule {
     iterations: 8,
     ahead: 0,
     sigma: [0.08, 0.03],
@@ -30,7 +30,7 @@ pub(in crate::tracking) const TRACK: Schedule = Schedule {
     pull: 0.35,
 };
 /// From a rough start.
-pub(in crate::tracking) const START: Schedule = Schedule {
+pub(crate) const START: Schedule = Schedule {
     iterations: 20,
     ahead: 0,
     sigma: [0.15, 0.04],
@@ -38,11 +38,11 @@ pub(in crate::tracking) const START: Schedule = Schedule {
     pull: 0.5,
 };
 /// Iterations over which kernel and reach shrink; fewer lose fast limbs, more cost time.
-pub(in crate::tracking) const ANNEAL: usize = 4;
+pub(crate) const ANNEAL: usize = 4;
 
 /// Residuals of a fit and their weights.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(in crate::tracking) struct FitTerms {
+pub(crate) struct FitTerms {
     /// Method of the correspondence search.
     pub association: Association,
     /// Weight of edge-to-edge pairs.
@@ -51,7 +51,7 @@ pub(in crate::tracking) struct FitTerms {
     pub free_space: f64,
     /// Factor on the rest-pose prior.
     pub rest_weight: f64,
-    /// Reduce the prior of angles in full view to [`crate::tracking::TrackerModel`]'s shares.
+    /// Reduce the prior of angles in full view to [`crate::TrackerModel`]'s shares.
     pub eased: bool,
     /// Floor for feet out of view.
     pub standing: Option<FloorStance>,
@@ -61,7 +61,7 @@ pub(in crate::tracking) struct FitTerms {
 
 /// From a rough start. Windows reject a reading of wrong normal and go on to the next, where a kd-tree rejects the pair;
 /// outlines and a stronger prior hold limbs that are not near their readings yet.
-pub(in crate::tracking) const START_TERMS: FitTerms = FitTerms {
+pub(crate) const START_TERMS: FitTerms = FitTerms {
     association: Association::Projective,
     edge_weight: 0.3,
     free_space: 0.0,
@@ -72,14 +72,14 @@ pub(in crate::tracking) const START_TERMS: FitTerms = FitTerms {
 };
 
 /// For comparisons of many hypotheses: outlines tell little between them and cost the most.
-pub(in crate::tracking) const HYPOTHESIS_TERMS: FitTerms = FitTerms {
+pub(crate) const HYPOTHESIS_TERMS: FitTerms = FitTerms {
     edge_weight: 0.0,
     ..START_TERMS
 };
 
 impl FitTerms {
     /// From frame to frame, as configured.
-    pub(in crate::tracking) fn tracking(config: &TrackerConfig) -> Self {
+    pub(crate) fn tracking(config: &TrackerConfig) -> Self {
         Self {
             association: config.association,
             edge_weight: config.edge_weight,

@@ -1,25 +1,25 @@
 //! Inputs and scratch of the pose fit.
 
 use super::schedule::{FitTerms, START_TERMS};
-use crate::body::{BoneTransforms, Pose};
-use crate::math::{P3, V3};
+use crate::TrackerModel;
+use crate::personal_body::PersonalBody;
 use crate::registration::{
     Dof, EdgePairs, ModelPoints, NormalEquations, Observation, Pair, PairingScratch, ROOT_UNKNOWNS,
 };
-use crate::tracking::TrackerModel;
-use crate::tracking::personal_body::PersonalBody;
 use nalgebra::{Matrix3, Vector3};
+use tryon_body::{BoneTransforms, Pose};
+use tryon_geometry::math::{P3, V3};
 
 /// Constants of one fit: body and readings.
 #[derive(Clone, Copy)]
-pub(in crate::tracking) struct FitContext<'a> {
+pub(crate) struct FitContext<'a> {
     pub model: &'a TrackerModel,
     pub body: &'a PersonalBody,
     pub observation: &'a Observation<'a>,
 }
 
 /// Scratch of the fit.
-pub(in crate::tracking) struct FitScratch {
+pub(crate) struct FitScratch {
     /// Residuals and weights, until set anew.
     pub terms: FitTerms,
     /// Bones of the last pose that was paired.
@@ -57,7 +57,7 @@ impl Default for FitScratch {
 
 impl FitScratch {
     /// Runs `work` with other terms.
-    pub(in crate::tracking) fn with_terms<T>(
+    pub(crate) fn with_terms<T>(
         &mut self,
         terms: FitTerms,
         work: impl FnOnce(&mut Self) -> T,
@@ -69,7 +69,7 @@ impl FitScratch {
     }
 
     /// Information of the last normal equations on a joint angle, per point, priors included; 0 before any.
-    pub(in crate::tracking) fn information(&self, angle: usize) -> f64 {
+    pub(crate) fn information(&self, angle: usize) -> f64 {
         let unknown = ROOT_UNKNOWNS + angle;
         let hessian = &self.equations.hessian;
         if unknown < hessian.nrows() {
@@ -80,7 +80,7 @@ impl FitScratch {
     }
 
     /// Number of point residuals of the current pairs.
-    pub(in crate::tracking) fn residuals(&self) -> usize {
+    pub(crate) fn residuals(&self) -> usize {
         let free = if self.terms.free_space > 0.0 {
             self.pairing.in_front.len()
         } else {
@@ -90,12 +90,12 @@ impl FitScratch {
     }
 
     /// Origin of the twists: the root joint, camera frame, metres.
-    pub(in crate::tracking) fn centre(&self) -> Vector3<f64> {
+    pub(crate) fn centre(&self) -> Vector3<f64> {
         self.bones.joints[0].coords
     }
 
     /// The posed samples.
-    pub(in crate::tracking) fn points<'a>(&'a self, model: &'a TrackerModel) -> ModelPoints<'a> {
+    pub(crate) fn points<'a>(&'a self, model: &'a TrackerModel) -> ModelPoints<'a> {
         ModelPoints {
             positions: &self.positions,
             normals: &self.normals,
@@ -106,7 +106,7 @@ impl FitScratch {
     }
 
     /// Poses the samples and draws them into the index image.
-    pub(in crate::tracking) fn draw(&mut self, context: &FitContext<'_>, pose: &Pose) {
+    pub(crate) fn draw(&mut self, context: &FitContext<'_>, pose: &Pose) {
         self.pose_samples(context, pose);
         let grid = context.observation.grid;
         let image = &mut self.pairing.image;

@@ -3,18 +3,18 @@
 use super::equations::{PoseSums, UNEXPLAINED, assemble, for_each_point, pair};
 use super::schedule::{ANNEAL, Schedule};
 use super::scratch::{FitContext, FitScratch};
-use crate::body::Pose;
+use crate::TrackerModel;
+use crate::extrapolation::LEVER;
+use crate::kinematics::apply;
 use crate::registration::PairingStats;
-use crate::tracking::TrackerModel;
-use crate::tracking::extrapolation::LEVER;
-use crate::tracking::kinematics::apply;
+use tryon_body::Pose;
 
 /// Width of the kernel in comparisons of poses, metres.
 const COMPARED_SIGMA: f64 = 0.05;
 
 /// Result of a fit.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(in crate::tracking) struct FitReport {
+pub(crate) struct FitReport {
     pub iterations: usize,
     pub converged: bool,
     /// Mean distance of pairs along the normal, metres, weighted by the kernel.
@@ -50,7 +50,7 @@ impl FitReport {
 }
 
 /// Evaluates a pose as it is, with pairs up to `distance` metres.
-pub(in crate::tracking) fn evaluate(
+pub(crate) fn evaluate(
     context: &FitContext<'_>,
     pose: &Pose,
     distance: f32,
@@ -63,7 +63,7 @@ pub(in crate::tracking) fn evaluate(
 }
 
 /// Fits `pose` to the readings: Gauss–Newton with damping, joint limits and a weak pull to the rest pose.
-pub(in crate::tracking) fn fit_pose(
+pub(crate) fn fit_pose(
     context: &FitContext<'_>,
     pose: &mut Pose,
     schedule: &Schedule,
@@ -103,7 +103,7 @@ pub(in crate::tracking) fn fit_pose(
 }
 
 /// Clamps joints to their limits, where those are configured.
-pub(in crate::tracking) fn limit(model: &TrackerModel, pose: &mut Pose) {
+pub(crate) fn limit(model: &TrackerModel, pose: &mut Pose) {
     if model.config.joint_limits {
         pose.clamp_to_limits(model.template.skeleton());
     }
@@ -112,11 +112,11 @@ pub(in crate::tracking) fn limit(model: &TrackerModel, pose: &mut Pose) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::camera::DepthImage;
-    use crate::math::Rigid;
-    use crate::tracking::pose_fit::{FitTerms, TRACK};
-    use crate::tracking::test_scene::{DepthScan, TestScene};
+    use crate::pose_fit::{FitTerms, TRACK};
+    use crate::test_scene::{DepthScan, TestScene};
     use nalgebra::{Translation3, Vector3};
+    use tryon_geometry::camera::DepthImage;
+    use tryon_geometry::math::Rigid;
 
     /// Side of a cell of the grid at the subject's distance, metres.
     const CELL: f64 = 0.015;

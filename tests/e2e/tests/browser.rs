@@ -131,10 +131,10 @@ impl Chain {
         let config = &self.config;
         let running = self.runtime.block_on(async {
             match name {
-                "capture" => tryon_capture::start(config, ctx).await,
-                "tracking" => tryon_tracking::start(config, ctx).await,
-                "cloth" => tryon_cloth::start(config, ctx).await,
-                _ => tryon_compositor::start(config, ctx).await,
+                "capture" => tryon_capture_service::start(config, ctx).await,
+                "tracking" => tryon_tracking_service::start(config, ctx).await,
+                "cloth" => tryon_cloth_service::start(config, ctx).await,
+                _ => tryon_compositor_service::start(config, ctx).await,
             }
         })?;
         let (at, url) = (running.address, format!("http://{}", running.address));

@@ -4,15 +4,15 @@ use crate::args::CompositeArgs;
 use anyhow::{Context, Result, bail};
 use std::path::Path;
 use std::process::ExitCode;
-use tryon::camera::RgbdFrame;
-use tryon::composite::{Appearance, GarmentView, Input, Model, State, Workspace, render};
 use tryon::formats::gltf::read_glb;
 use tryon::formats::image::{read_color, read_png_depth, write_png_rgb};
 use tryon::formats::obj::read_obj;
 use tryon::formats::{depth_to_mm, read_camera};
-use tryon::math::P3;
-use tryon::mesh::Face;
+use tryon::geometry::camera::RgbdFrame;
+use tryon::geometry::math::P3;
+use tryon::geometry::mesh::Face;
 use tryon::mirror::library_appearance;
+use tryon::view::{Appearance, GarmentView, Input, Model, State, Workspace, render};
 
 /// A garment mesh for drawing.
 struct Loaded {

@@ -118,7 +118,7 @@ fn body() -> Finding {
 }
 
 fn adapter() -> Finding {
-    match tryon::gpu::adapters() {
+    match tryon::view::gpu::adapters() {
         list if list.is_empty() => Finding {
             what: "graphics",
             verdict: Verdict::Note,

@@ -10,8 +10,8 @@ use tryon::dressing::{DressOptions, dress};
 use tryon::formats::gltf::{GlbMesh, write_glb, write_glb_motion};
 use tryon::formats::obj::write_obj;
 use tryon::garment::{GarmentMesh, Pattern, Size, Triangulation, library};
-use tryon::math::{P3, V3, World};
-use tryon::par::Par;
+use tryon::geometry::math::{P3, V3, World};
+use tryon::geometry::par::Par;
 use tryon::synth::{Actor, Sequence, Setting};
 
 /// Runs the command.

@@ -17,8 +17,8 @@ use tryon::formats::open_recording;
 use tryon::formats::sewn_obj::read_sewn_obj;
 use tryon::garment::import::from_mesh;
 use tryon::garment::{GarmentKind, GarmentMesh, Material, Triangulation};
-use tryon::math::P3;
-use tryon::mesh::{Face, Topology, TriMesh};
+use tryon::geometry::math::P3;
+use tryon::geometry::mesh::{Face, Topology, TriMesh};
 
 /// Colour of imported meshes without their own.
 const GREY: [u8; 3] = [180, 180, 180];

@@ -1,7 +1,5 @@
 //! Commands of the command line, one file each.
 
-pub(crate) mod bench;
-pub(crate) mod ccd;
 pub(crate) mod clothcap;
 pub(crate) mod composite;
 pub(crate) mod demo;
@@ -17,5 +15,4 @@ pub(crate) mod run_offline;
 pub(crate) mod simulate;
 pub(crate) mod token;
 pub(crate) mod track;
-pub(crate) mod train_parts;
 pub(crate) mod up;

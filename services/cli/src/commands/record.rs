@@ -9,8 +9,8 @@ use std::process::ExitCode;
 use std::sync::Arc;
 use std::time::Duration;
 use tokio::sync::watch;
-use tryon::camera::{Calibration, RgbdFrame};
 use tryon::formats::{McapWriter, RgbdFolderWriter};
+use tryon::geometry::camera::{Calibration, RgbdFrame};
 use tryon_kit::auth::Auth;
 use tryon_kit::bus::{Ends, ZenohBus};
 use tryon_kit::client::channel;
@@ -84,7 +84,7 @@ pub(crate) fn run(args: &RecordArgs) -> Result<ExitCode> {
 }
 
 fn from_source(args: &RecordArgs) -> Result<u64> {
-    let mut source = tryon_capture::open(&args.source)?;
+    let mut source = tryon_capture_service::open(&args.source)?;
     let mut sink = Sink::create(&args.out, source.calibration())?;
     let bar = input::progress(source.len().map(|n| n as u64), "recording");
     let mut first = None;

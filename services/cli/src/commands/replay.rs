@@ -65,7 +65,7 @@ pub(crate) fn run(args: &ReplayArgs) -> Result<ExitCode> {
             inside: Tls::inside(&config, identity.as_ref())?,
         };
         let key = format!("tryon/{}/{name}/rgbd", config.capture.store);
-        let service = tryon_capture::start(&config, ctx).await?;
+        let service = tryon_capture_service::start(&config, ctx).await?;
         say(format_args!(
             "{} on {key}, bus {}, grpc {}; Ctrl-C ends it",
             args.input.display(),

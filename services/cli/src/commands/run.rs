@@ -8,14 +8,14 @@ use anyhow::{Context, Result, ensure};
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::process::ExitCode;
-use tryon::camera::{Calibration, ColorImage, RgbdFrame};
 use tryon::formats::image::write_png_rgb;
 use tryon::formats::{RgbdSource, open_recording};
-use tryon::math::{P3, V3};
-use tryon::mesh::{Topology, TriMesh, vertex_normals};
+use tryon::geometry::camera::{Calibration, ColorImage, RgbdFrame};
+use tryon::geometry::math::{P3, V3};
+use tryon::geometry::mesh::{Topology, TriMesh, vertex_normals};
+use tryon::geometry::par::{Par, with_threads};
+use tryon::geometry::raster::{View, VisibilityBuffer, rasterise};
 use tryon::mirror::{Mirror, MirrorFrame};
-use tryon::par::{Par, with_threads};
-use tryon::raster::{View, VisibilityBuffer, rasterise};
 use tryon::tracking::{LostReason, Status};
 
 /// report.json of this command.

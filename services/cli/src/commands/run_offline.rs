@@ -13,18 +13,18 @@ use std::ops::ControlFlow;
 use std::path::Path;
 use std::process::ExitCode;
 use std::time::Instant;
-use tryon::camera::ColorImage;
+use tryon::cloth::fine::{
+    FrameTargets, OfflineFrameReport, OfflineSolver, OfflineState, checkpoint_frame,
+};
 use tryon::formats::gltf::{GlbMesh, write_glb_motion};
 use tryon::formats::image::write_png_rgb;
-use tryon::math::{P3, V3d};
+use tryon::geometry::camera::ColorImage;
+use tryon::geometry::math::{P3, V3d};
+use tryon::geometry::par::{Par, with_threads};
 use tryon::mirror::{
     DressedOutfit, FrameClock, LongGap, MirrorError, OfflineDrapeReport, OfflineOutfit,
     OutfitPainter,
 };
-use tryon::offline::{
-    FrameTargets, OfflineFrameReport, OfflineSolver, OfflineState, checkpoint_frame,
-};
-use tryon::par::{Par, with_threads};
 
 /// Nominal time between frames of the animation (s).
 const INTERVAL: f32 = 1.0 / 30.0;

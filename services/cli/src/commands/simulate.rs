@@ -9,11 +9,11 @@ use anyhow::Result;
 use serde::Serialize;
 use std::ops::ControlFlow;
 use std::process::ExitCode;
+use tryon::cloth::fine::{OfflineFrameReport, OfflineScene, OfflineSettings, checkpoint_frame};
 use tryon::cloth::scene::{self, RunConfig, Scene};
 use tryon::formats::gltf::{GlbMesh, write_glb_motion};
-use tryon::math::P3;
-use tryon::offline::{OfflineFrameReport, OfflineScene, OfflineSettings, checkpoint_frame};
-use tryon::par::Par;
+use tryon::geometry::math::P3;
+use tryon::geometry::par::Par;
 
 /// Base colour of the cloth in the animation, sRGB.
 const CLOTH: [u8; 3] = [190, 190, 200];

@@ -2,18 +2,18 @@
 
 use crate::args::TrackArgs;
 use crate::input;
+use crate::overlay::overlay;
 use anyhow::{Context, Result, ensure};
 use serde_json::json;
 use std::collections::BTreeMap;
 use std::io::{BufWriter, Write};
 use std::process::ExitCode;
 use tryon::body::BoneTransforms;
-use tryon::camera::{ColorImage, RgbdFrame};
-use tryon::evaluate::overlay;
 use tryon::formats::image::write_png_rgb;
 use tryon::formats::obj::write_obj;
 use tryon::formats::{RgbdSource, open_recording};
-use tryon::par::with_threads;
+use tryon::geometry::camera::{ColorImage, RgbdFrame};
+use tryon::geometry::par::with_threads;
 use tryon::tracking::{
     Status, StepReport, TrackerConfig, TrackerModel, TrackerState, Workspace, step,
 };

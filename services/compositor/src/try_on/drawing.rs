@@ -187,7 +187,7 @@ impl Drawing {
 mod tests {
     use super::*;
     use tokio::sync::oneshot;
-    use tryon::camera::{Calibration, DepthImage, Intrinsics, RgbdFrame};
+    use tryon::geometry::camera::{Calibration, DepthImage, Intrinsics, RgbdFrame};
     use tryon_kit::frames::Exposure;
     use tryon_proto::v1::{FrameId, Picture};
 

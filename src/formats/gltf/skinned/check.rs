@@ -1,9 +1,9 @@
 //! Validation of a skinned scene before it is written. A fault names the array and the entry.
 
 use super::scene::{GlbJoint, GlbJointMotion, SkinnedGlb, SkinnedMesh};
-use crate::formats::FormatError;
-use crate::math::V3;
+use crate::FormatError;
 use std::path::Path;
+use tryon_geometry::math::V3;
 
 /// Largest deviation of a sum of skinning weights from one, and of a rotation's norm.
 /// Far above f32 rounding; normalising such weights moves a vertex by 0.1 mm per metre from the origin.

@@ -1,10 +1,10 @@
 //! Independent evaluation of a skinned `.glb` for tests: animation, node hierarchy, morph targets, skinning.
 
-use crate::math::P3;
 use ::gltf::animation::Interpolation;
 use ::gltf::animation::util::ReadOutputs;
 use ::gltf::{Gltf, Node};
 use nalgebra::{Matrix4, Point3, Quaternion, Translation3, UnitQuaternion, Vector3};
+use tryon_geometry::math::P3;
 
 /// Mesh at one time of the animation.
 pub(crate) struct PosedMesh {

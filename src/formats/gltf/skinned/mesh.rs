@@ -5,8 +5,8 @@ use super::super::srgb::linear;
 use super::super::surface::normals;
 use super::joints::add_influences;
 use super::scene::SkinnedMesh;
-use crate::math::P3;
 use serde_json::{Value, json};
+use tryon_geometry::math::P3;
 
 /// Component type of 16-bit unsigned integers.
 const UNSIGNED_SHORT: u32 = 5123;

@@ -3,7 +3,7 @@
 mod animation;
 mod check;
 #[cfg(test)]
-pub(crate) mod decoded;
+mod decoded;
 mod joints;
 mod mesh;
 mod scene;
@@ -16,7 +16,7 @@ pub use scene::{
 };
 
 use super::document::GlbDocument;
-use crate::formats::FormatError;
+use crate::FormatError;
 use std::path::Path;
 
 /// Encodes skinned meshes as a `.glb`; all share one skin and one animation.

@@ -1,8 +1,8 @@
 //! Contents of a skinned glTF file: joints, meshes and their motion. Metres, seconds, y up.
 
 use super::super::surface::GlbMesh;
-use crate::math::{P3d, V3};
 use nalgebra::UnitQuaternion;
+use tryon_geometry::math::{P3d, V3};
 
 /// Meshes on one skeleton, and the motion of its joints.
 #[derive(Clone, Copy, Debug)]

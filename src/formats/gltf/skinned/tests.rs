@@ -3,11 +3,11 @@ use super::animation::continuous;
 use super::decoded::{PosedMesh, posed_meshes};
 use super::joints::influences;
 use super::*;
-use crate::formats::gltf::{GlbMesh, parse_gltf};
-use crate::math::{P3, P3d, V3, V3d};
-use crate::mesh::Face;
+use crate::gltf::{GlbMesh, parse_gltf};
 use nalgebra::UnitQuaternion;
 use std::f64::consts::FRAC_PI_2;
+use tryon_geometry::math::{P3, P3d, V3, V3d};
+use tryon_geometry::mesh::Face;
 
 const AT: &str = "wear.glb";
 const FACES: [Face; 1] = [[0, 1, 2]];

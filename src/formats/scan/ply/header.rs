@@ -1,6 +1,6 @@
 //! Header of a PLY file: encoding, elements and their properties.
 
-use crate::formats::FormatError;
+use crate::FormatError;
 use std::path::Path;
 
 /// Number format of a property.

@@ -2,13 +2,13 @@
 
 use super::header::{PlyElement, PlyHeader, PlyProperty, PlyScalar, PlyType, parse_header};
 use super::values::PlyValues;
-use crate::formats::FormatError;
-use crate::formats::image::read_limited;
-use crate::formats::scan::colors::{quantized, white};
-use crate::formats::scan::mesh::ScanMesh;
-use crate::math::{P3, V3};
-use crate::mesh::Face;
+use crate::FormatError;
+use crate::image::read_limited;
+use crate::scan::colors::{quantized, white};
+use crate::scan::mesh::ScanMesh;
 use std::path::Path;
+use tryon_geometry::math::{P3, V3};
+use tryon_geometry::mesh::Face;
 
 /// Largest PLY scan, bytes; a scan of 10 million vertices takes about 700 MB.
 const MAX_BYTES: u64 = 2 << 30;
@@ -37,7 +37,7 @@ struct VertexColumns {
 /// # Errors
 /// Names the header line, or the element and row at fault: a number that is cut off or malformed, an index out of
 /// range, a polygon with fewer than three corners.
-pub(in crate::formats::scan) fn read_ply(path: &Path) -> Result<ScanMesh, FormatError> {
+pub(in crate::scan) fn read_ply(path: &Path) -> Result<ScanMesh, FormatError> {
     parse_ply(&read_limited(path, MAX_BYTES)?, path)
 }
 

@@ -1,10 +1,10 @@
 //! PLY writer: little-endian scans with optional normals, colours and labels.
 
-use crate::formats::FormatError;
-use crate::math::{P3, V3};
-use crate::mesh::Face;
+use crate::FormatError;
 use std::fmt::Write as _;
 use std::path::Path;
+use tryon_geometry::math::{P3, V3};
+use tryon_geometry::mesh::Face;
 
 /// Coloured, labelled mesh to write.
 #[derive(Clone, Copy, Debug, Default)]

@@ -1,9 +1,9 @@
 use super::{folder, read_bytes, refusal};
-use crate::camera::ColorImage;
-use crate::formats::image::{encode_png_rgb, write_png_rgb};
-use crate::math::P3;
+use crate::image::{encode_png_rgb, write_png_rgb};
 use serde_json::{Value, json};
 use std::path::Path;
+use tryon_geometry::camera::ColorImage;
+use tryon_geometry::math::P3;
 
 /// Texture with a red and green upper row and a blue and white lower row.
 fn texture() -> ColorImage {

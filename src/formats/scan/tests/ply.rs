@@ -1,7 +1,7 @@
 use super::{folder, read_bytes, refusal};
-use crate::formats::scan::{PlyMesh, ScanMesh, read_scan, write_ply};
-use crate::math::{P3, V3};
+use crate::scan::{PlyMesh, ScanMesh, read_scan, write_ply};
 use proptest::prelude::*;
+use tryon_geometry::math::{P3, V3};
 
 /// Two triangles of a square with normals and colours.
 fn square() -> ScanMesh {

@@ -1,8 +1,8 @@
 use super::{folder, read_bytes};
-use crate::formats::scan::files::natural_order;
-use crate::formats::scan::{read_scan, scan_files};
-use crate::formats::shared_data;
-use crate::math::P3;
+use crate::scan::files::natural_order;
+use crate::scan::{read_scan, scan_files};
+use crate::shared_data;
+use tryon_geometry::math::P3;
 
 #[test]
 fn folders_are_sequences_in_natural_order() {

@@ -9,7 +9,7 @@ use std::time::Instant;
 use tokio::time::timeout;
 use tonic::{Code, Status, Streaming};
 use tryon::formats::image::decode_color;
-use tryon::math::P3;
+use tryon::geometry::math::P3;
 use tryon_kit::auth::Connection;
 use tryon_proto::convert::garment::{GarmentReader, topology_from_wire};
 use tryon_proto::v1::cloth_service_client::ClothServiceClient;

@@ -165,10 +165,10 @@ impl Kiosk {
                 inside: Tls::inside(&config, None)?,
             };
             match part {
-                Part::Capture => tryon_capture::start(&config, ctx).await,
-                Part::Tracking => tryon_tracking::start(&config, ctx).await,
-                Part::Cloth => tryon_cloth::start(&config, ctx).await,
-                Part::Compositor => tryon_compositor::start(&config, ctx).await,
+                Part::Capture => tryon_capture_service::start(&config, ctx).await,
+                Part::Tracking => tryon_tracking_service::start(&config, ctx).await,
+                Part::Cloth => tryon_cloth_service::start(&config, ctx).await,
+                Part::Compositor => tryon_compositor_service::start(&config, ctx).await,
             }
         });
         match running {

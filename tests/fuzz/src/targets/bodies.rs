@@ -11,7 +11,7 @@ use tryon::formats::morph_target::read_morph_target;
 use tryon::formats::npy::read_npy;
 use tryon::formats::npz::read_smpl;
 use tryon::formats::read_motion;
-use tryon::math::P3;
+use tryon::geometry::math::P3;
 
 /// SMPL-layout archives: members packed anew, or a raw archive.
 pub(super) const NPZ: Target = Target::new(

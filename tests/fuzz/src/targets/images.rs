@@ -3,13 +3,13 @@
 use super::{Target, text};
 use crate::bundle::Bundle;
 use std::path::Path;
-use tryon::camera::{ColorImage, DepthImage};
 use tryon::formats::PositionCoder;
 use tryon::formats::image::{
     decode_color, decode_depth, decode_jpeg, decode_png_color, decode_png_depth, encode_depth,
     encode_jpeg, encode_png_depth, encode_png_rgb,
 };
-use tryon::math::P3;
+use tryon::geometry::camera::{ColorImage, DepthImage};
+use tryon::geometry::math::P3;
 
 /// Deflate and zstd legitimately expand a byte by thousands; sizes are checked before, and the largest image is bounded.
 const PER_PACKED_BYTE: usize = 60_000;

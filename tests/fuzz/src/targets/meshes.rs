@@ -11,7 +11,7 @@ use tryon::formats::obj::parse_obj;
 use tryon::formats::scan::{PlyMesh, read_scan, write_ply};
 use tryon::formats::sewn_obj::parse_sewn_obj;
 use tryon::garment::import::read_mesh;
-use tryon::math::{P3, V3};
+use tryon::geometry::math::{P3, V3};
 
 const OBJ_WORDS: &[&str] = &[
     "v", "vt", "vn", "f", "o", "g", "s", "mtllib", "usemtl", "stitch", "1/1/1", "1//1", "-1",

@@ -4,8 +4,8 @@ use super::{Target, text};
 use crate::bundle::Bundle;
 use crate::pack;
 use std::path::Path;
-use tryon::camera::{Calibration, ColorImage, DepthImage, Intrinsics, RgbdFrame};
 use tryon::formats::{McapWriter, RgbdFolderWriter, open_recording};
+use tryon::geometry::camera::{Calibration, ColorImage, DepthImage, Intrinsics, RgbdFrame};
 
 /// Most frames read from an input.
 const MOST_FRAMES: usize = 50;

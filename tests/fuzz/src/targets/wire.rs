@@ -5,7 +5,7 @@ use crate::bundle::Bundle;
 use crate::execute::Scratch;
 use bytes::Bytes;
 use std::path::Path;
-use tryon::camera::{Calibration, ColorImage, DepthImage, Intrinsics, RgbdFrame};
+use tryon::geometry::camera::{Calibration, ColorImage, DepthImage, Intrinsics, RgbdFrame};
 use tryon_proto::Message;
 use tryon_proto::convert::frame::{Exposure, exposure_from_wire, exposure_to_wire};
 use tryon_proto::convert::garment::GarmentReader;
@@ -313,7 +313,7 @@ fn garment_seeds() -> Vec<Bundle> {
     let mut coder = tryon::formats::PositionCoder::new(4, &[[0, 1, 2], [1, 3, 2]]);
     let mut bundle = Bundle::default();
     for i in 0..3 {
-        let p = tryon::math::P3::new(0.1 * i as f32, 1.0, 2.0);
+        let p = tryon::geometry::math::P3::new(0.1 * i as f32, 1.0, 2.0);
         let frame = v1::GarmentFrame {
             outfit_revision: 1,
             garments: vec![v1::GarmentMesh {

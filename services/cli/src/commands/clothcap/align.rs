@@ -8,7 +8,7 @@ use serde_json::json;
 use std::time::Instant;
 use tryon::clothcap::align::Aligner;
 use tryon::formats::scan::{PlyMesh, write_ply};
-use tryon::par::with_threads;
+use tryon::geometry::par::with_threads;
 
 /// Runs the command.
 pub(super) fn run(args: &ClothcapAlignArgs) -> Result<()> {

@@ -14,7 +14,7 @@ use tryon::clothcap::scan::BodyScan;
 use tryon::clothcap::segment::BodyRegion;
 use tryon::clothcap::{CaptureConfig, FrameCapture, FrameReport, OutfitCapture};
 use tryon::formats::image::write_png_rgb;
-use tryon::par::with_threads;
+use tryon::geometry::par::with_threads;
 
 /// Runs the command.
 pub(super) fn run(args: &ClothcapCaptureArgs) -> Result<()> {

@@ -13,7 +13,7 @@ use tryon::formats::gltf::{
     SkinnedGlb, SkinnedMesh, write_skinned_glb,
 };
 use tryon::formats::write_obj_scene;
-use tryon::math::{P3, P3d, V3};
+use tryon::geometry::math::{P3, P3d, V3};
 
 /// Dressed body in each frame of a motion.
 pub(super) struct DressedMotion<'a> {

@@ -19,8 +19,8 @@ use tryon::formats::image::{encode_png_rgb, write_png_rgb};
 use tryon::formats::npz::read_smpl;
 use tryon::formats::read_motion;
 use tryon::formats::scan::ScanMesh;
-use tryon::math::{P3, World};
-use tryon::par::with_threads;
+use tryon::geometry::math::{P3, World};
+use tryon::geometry::par::with_threads;
 use tryon::synth::{Actor, Sequence, Setting};
 
 /// Frames a second of captures and motions.

@@ -11,7 +11,7 @@ use tryon::clothcap::ScanSegmenter;
 use tryon::clothcap::multi::MultiCloth;
 use tryon::clothcap::segment::Labelling;
 use tryon::formats::scan::{PlyMesh, read_scan, write_ply};
-use tryon::par::with_threads;
+use tryon::geometry::par::with_threads;
 
 /// Runs the command.
 pub(super) fn run(args: &ClothcapSegmentArgs) -> Result<()> {

@@ -3,7 +3,7 @@
 use anyhow::Result;
 use std::path::Path;
 use tryon::formats::gltf::{GlbMesh, write_glb_motion};
-use tryon::math::P3;
+use tryon::geometry::math::P3;
 use tryon_proto::convert::WireError;
 use tryon_proto::convert::garment::WornGarment;
 

@@ -3,7 +3,7 @@
 use super::order::FineFrame;
 use crate::report::{GarmentPart, garment_parts};
 use serde::{Deserialize, Serialize};
-use tryon::math::{Camera, Rigid, World};
+use tryon::geometry::math::{Camera, Rigid, World};
 use tryon_proto::convert::WireError;
 use tryon_proto::convert::garment::WornGarment;
 use tryon_proto::convert::geometry::rigid_from_wire;

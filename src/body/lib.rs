@@ -1,0 +1,53 @@
+//! The articulated template: skeleton, twists, skinning, shape, bone scales, displacements, the one map from vertices to parts and limbs; the embedded body; importers.
+//!
+//! # Ideas
+//!
+//! Body:
+//!
+//! - Kinematic tree, ancestors (δ of eq. 2), joint limits: [`mod@skeleton`].
+//! - Forward kinematics: [`mod@pose`].
+//! - Skinning (eq. 4): [`mod@skinning`].
+//! - Lengths of bones without change of girth (eq. 18 to 20), displacements on the template: [`mod@shape`].
+//! - Parts, limbs, joint names: [`mod@parts::joints`], [`mod@parts::vertices`].
+//! - The embedded figure: [`mod@embedded::figure`] (proportions), [`mod@embedded::field`] (surface),
+//!   [`mod@embedded::rig`], [`mod@embedded::directions`] (shape space), [`mod@embedded::statistics`] (published
+//!   measurements).
+//! - Tape measures: [`mod@measure::tape`].
+//! - A skeleton for a bare scan: [`mod@rig`], `src/dressing/rig_standing.rs`.
+//!
+//! Garments from scans:
+//!
+//! - Pose blend shapes (eq. 1, 2): [`mod@pose_shapes`], [`mod@pose_offsets`].
+#![allow(rustdoc::private_intra_doc_links)] // the index of ideas names private modules
+
+#[cfg(test)]
+#[expect(dead_code, reason = "colours are checked in the other crate")]
+#[path = "../formats/gltf/skinned/decoded.rs"]
+mod decoded_glb;
+pub mod embedded;
+mod error;
+pub mod import;
+pub mod measure;
+pub mod parts;
+mod pose;
+mod pose_offsets;
+mod pose_shapes;
+mod rig;
+mod shape;
+mod shape_space;
+mod skeleton;
+mod skin_weights;
+mod skinning;
+mod template;
+
+pub use error::BodyError;
+pub use pose::{BoneTransforms, Pose};
+pub use pose_offsets::PoseOffsets;
+pub use pose_shapes::PoseShapes;
+pub use rig::rig;
+pub use shape::{BodyShape, RestBody};
+pub use shape_space::ShapeSpace;
+pub use skeleton::{Joint, JointMotion, Skeleton};
+pub use skin_weights::SkinWeights;
+pub use skinning::{skin, skin_moved};
+pub use template::Template;

@@ -1,0 +1,42 @@
+//! Anchors of a patch as pins of an interval.
+
+use super::body_contact::BodyContacts;
+use crate::live::outfit_model::Model;
+use crate::live::patch::{PatchWork, v4};
+use crate::live::solver::explicit::Pin;
+
+/// Rate at which anchors of strength ½ approach their target, 1/s.
+const ANCHOR_RATE: f64 = 120.0;
+
+/// Pins of a patch's anchors, which move with the body through an interval. What sleeps is pinned too.
+pub(in crate::live) fn pin_anchors(
+    model: &Model,
+    garment: usize,
+    patch: usize,
+    body: &BodyContacts<'_>,
+    p: &mut PatchWork,
+) {
+    p.pins.clear();
+    p.pinned.clear();
+    p.pinned.extend_from_slice(&p.asleep);
+    let h = model.garments[garment].h;
+    for (local, a) in model.anchors_of(garment, patch) {
+        if a.strength <= 0.0 || p.asleep[local as usize] {
+            continue;
+        }
+        let start = a.position(a.body.map(|v| body.now.vertices[v as usize]));
+        let end = a.position(a.body.map(|v| body.at_interval_end(v as usize)));
+        let stiffness = if a.strength >= 1.0 {
+            1.0
+        } else {
+            1.0 - (-h * ANCHOR_RATE * a.strength / (1.0 - a.strength)).exp()
+        };
+        p.pinned[local as usize] = a.strength >= 1.0;
+        p.pins.push(Pin {
+            vertex: local,
+            target: v4(&start.coords),
+            velocity: v4(&((end - start) / body.span)),
+            stiffness: stiffness as f32,
+        });
+    }
+}

@@ -1,0 +1,127 @@
+//! Immutable data of an outfit on a body.
+
+use super::collision::collision_model;
+use super::config::Config;
+use super::error::ClothError;
+use super::garment_model::GarmentModel;
+use super::model::partition::Partition;
+use super::outfit::{AnchorBinding, Outfit};
+use super::repair::sleeve_rings::Arms;
+use super::sleep::island_model::skin_clusters;
+use crate::contact::{CollisionModel, MapView};
+use tryon_body::parts::vertex_masks;
+use tryon_body::{SkinWeights, Template};
+use tryon_geometry::par;
+
+/// Everything immutable about an outfit on a body. Share it by `Arc`.
+#[derive(Debug)]
+pub struct Model {
+    /// Garments and anchors.
+    pub outfit: Outfit,
+    pub(super) config: Config,
+    pub(super) garments: Vec<GarmentModel>,
+    pub(super) collision: CollisionModel,
+    /// Body vertices in compact clusters.
+    pub(super) skin_clusters: Partition,
+    pub(super) arms: Arms,
+    pub(super) weights: SkinWeights,
+    pub(super) joints: usize,
+    pub(super) views: [MapView; 4],
+}
+
+impl Model {
+    /// Prepares an outfit for simulation on a body made from `template`.
+    ///
+    /// # Errors
+    /// Faults of the garments (triangle or edge named) or of the settings (field named).
+    pub fn new(template: &Template, outfit: Outfit, config: Config) -> Result<Self, ClothError> {
+        config.check()?;
+        check_anchors(template, &outfit)?;
+        let mut garments: Vec<_> = outfit.garments.iter().map(|_| None).collect();
+        par::for_chunks(config.par, &mut garments, 1, |order, garment| {
+            let offset = config.layer_offset(order, outfit.garments.len());
+            garment[0] = Some(GarmentModel::new(&outfit.garments[order], &config, offset));
+        });
+        let garments = garments.into_iter().flatten().collect::<Result<_, _>>()?;
+        let collision = collision_model(template, &config)?;
+        let mut model = Self {
+            skin_clusters: skin_clusters(collision.surface()),
+            arms: Arms::new(template, &vertex_masks(template)),
+            weights: template.weights().clone(),
+            joints: template.skeleton().len(),
+            views: MapView::around(config.camera_toward, config.map_detail),
+            collision,
+            garments,
+            outfit,
+            config,
+        };
+        model.assign_anchors();
+        Ok(model)
+    }
+    /// Vertices of the body it was made for.
+    pub fn body_vertices(&self) -> usize {
+        self.collision.surface().vertices()
+    }
+    /// Settings of its steps.
+    pub fn config(&self) -> &Config {
+        &self.config
+    }
+    /// Replaces the settings of later steps, those of the collision body too, and returns the last ones. Substeps, patches and offsets stay.
+    pub fn replace_config(&mut self, config: Config) -> Config {
+        self.collision.set_config(config.collision());
+        std::mem::replace(&mut self.config, config)
+    }
+    /// Replaces the anchors.
+    pub fn set_anchors(&mut self, anchors: Vec<Vec<AnchorBinding>>) {
+        self.outfit.anchors = anchors;
+        self.assign_anchors();
+    }
+    fn assign_anchors(&mut self) {
+        for (g, bindings) in self.garments.iter_mut().zip(&self.outfit.anchors) {
+            g.assign_anchors(bindings);
+        }
+    }
+    /// Patch vertex and binding of a patch's anchors.
+    pub(super) fn anchors_of(
+        &self,
+        garment: usize,
+        patch: usize,
+    ) -> impl Iterator<Item = (u32, &AnchorBinding)> {
+        let bindings = &self.outfit.anchors[garment];
+        self.garments[garment].anchors[patch]
+            .iter()
+            .map(move |(i, k)| (*i, &bindings[*k]))
+    }
+    /// The body that garments meet.
+    pub fn collision(&self) -> &CollisionModel {
+        &self.collision
+    }
+    /// Distance of a garment from the skin, metres.
+    pub fn offset(&self, garment: usize) -> f64 {
+        self.garments[garment].offset
+    }
+}
+
+/// Checks that there are anchors for every garment, of vertices that exist.
+fn check_anchors(template: &Template, outfit: &Outfit) -> Result<(), ClothError> {
+    if outfit.anchors.len() != outfit.garments.len() {
+        return Err(ClothError::Count {
+            what: "anchor lists",
+            got: outfit.anchors.len(),
+            expected: outfit.garments.len(),
+        });
+    }
+    let body = template.mesh().vertices().len();
+    for (g, anchors) in outfit.garments.iter().zip(&outfit.anchors) {
+        let is_faulty = |a: &&AnchorBinding| {
+            a.vertex as usize >= g.vertices || a.body.iter().any(|v| *v as usize >= body)
+        };
+        if let Some(a) = anchors.iter().find(is_faulty) {
+            return Err(ClothError::field(
+                &format!("anchor of vertex {}", a.vertex),
+                "it names a vertex that does not exist",
+            ));
+        }
+    }
+    Ok(())
+}

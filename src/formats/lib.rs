@@ -1,0 +1,68 @@
+//! Files in and out: MCAP, RGBD folders, npz bodies, OBJ, glTF, patterns. Bytes to domain types, never a panic.
+//!
+//! # Ideas
+//!
+//! Body:
+//!
+//! - Bodies in SMPL's layout: [`mod@npz`], `src/body/import.rs`.
+//!
+//! Camera and files:
+//!
+//! - Recordings: [`mod@recording`], [`mod@mcap_file`], [`mod@rgbd_folder`].
+//! - Lossless depth compression: [`mod@image::depth_codec`].
+//! - Motion clips: [`mod@bvh`], [`mod@asf_amc`].
+//! - GlTF, OBJ, MakeHuman: [`mod@gltf`], [`mod@obj`], [`mod@mhclo`].
+//! - Image size limits: [`mod@image::limits`].
+//!
+//! Contact of the offline cloth:
+//!
+//! - Queries with truth: [`mod@ccd_queries`], scored by `tools/bench/src/ccd.rs` (`tryon-bench ccd`).
+//!
+//! Wire and processes:
+//!
+//! - Compression of positions, keyframe or delta: [`mod@position_codec`].
+#![allow(rustdoc::private_intra_doc_links)] // the index of ideas names private modules
+
+mod asf_amc;
+mod bvh;
+pub mod ccd_queries;
+mod error;
+pub mod fabric_json;
+mod foxglove;
+pub mod garmentcode;
+pub mod gltf;
+pub mod image;
+mod mcap_file;
+pub mod mhclo;
+pub mod morph_target;
+mod motion;
+mod motion_clip;
+pub mod npy;
+mod npy_frames;
+pub mod npz;
+pub mod obj;
+mod obj_records;
+mod obj_scene;
+mod position_codec;
+mod private_file;
+mod recording;
+mod rgbd_folder;
+mod rgbd_source;
+pub mod scan;
+pub mod sewn_obj;
+mod shared_data;
+mod sibling;
+mod texture_points;
+
+pub use error::FormatError;
+pub use mcap_file::{McapReader, McapWriter};
+pub use motion::read_motion;
+pub use motion_clip::MotionClip;
+pub use npy_frames::NpyFrames;
+pub use obj_scene::write_obj_scene;
+pub use position_codec::{PositionCoder, STEP as POSITION_STEP};
+pub use recording::open_recording;
+pub use rgbd_folder::{RgbdFolder, RgbdFolderWriter, depth_to_mm, read_camera};
+pub use rgbd_source::RgbdSource;
+pub use shared_data::shared_data;
+pub use texture_points::TexturePoint;

@@ -1,0 +1,39 @@
+//! A garment before it moves: panels, seams, materials, rest shape, sizes, anchors.
+//!
+//! # Ideas
+//!
+//! - Panels, seams, darts: [`mod@pattern`].
+//! - Welding of panels to one mesh: [`mod@mesh`].
+//! - Triangles of a panel: [`mod@triangulate`].
+//! - Fabrics in SI units: [`mod@material`].
+//! - Drafts of tops with their sleeves and hoods: [`mod@library::top`].
+//! - Trousers, skirts, dress: [`mod@library::trousers`], [`mod@library::skirt`], [`mod@library::dress`].
+//! - Sizes: [`mod@size`].
+//! - GarmentCode: [`mod@import::garmentcode`].
+//! - Coarser meshes of imported garments: [`mod@import::coarsen`].
+#![allow(rustdoc::private_intra_doc_links)] // the index of ideas names private modules
+
+mod error;
+mod fabric_image;
+mod flat_triangle;
+pub mod import;
+pub mod library;
+mod material;
+mod mesh;
+mod outline;
+mod pattern;
+mod presets;
+mod size;
+mod subdivision;
+mod triangulate;
+mod union_find;
+
+pub use error::GarmentError;
+pub use fabric_image::FabricImage;
+pub use flat_triangle::rest_area;
+pub use material::{IsotropicSolid, Material};
+pub use mesh::{AnchorKind, AnchorSet, GarmentMesh, Region, RenderMesh, Triangulation};
+pub use outline::{Curve, PanelEdge};
+pub use pattern::{Anchor, Dart, GarmentKind, Panel, Pattern, Placement, Seam, Side};
+pub use size::{BodyMeasures, Size, SizeRow, size_table};
+pub use subdivision::GarmentSubdivision;

@@ -1,0 +1,44 @@
+//! Small algebra that nalgebra lacks, deterministic parallel loops, meshes and their topology, cameras and images, sparse
+//! systems, neighbours, rasterising.
+//!
+//! # Ideas
+//!
+//! Mathematics and meshes:
+//!
+//! - Twists, exponential maps (eq. 1): [`mod@math::lie`].
+//! - Typed frames: [`mod@math::frames`].
+//! - Nearest rotation: [`mod@math::polar`].
+//! - Finite-difference check of energies and residuals: [`mod@math::derivative_check`].
+//! - Deterministic parallel loops: [`mod@par`].
+//! - Spin barrier: [`mod@par::lockstep`].
+//! - Edges, neighbours, boundaries: [`mod@mesh::topology`].
+//! - Remeshing: [`mod@mesh::remesh`].
+//! - Sparse Cholesky, conjugate gradients: [`mod@linear::cholesky`], [`mod@linear::conjugate_gradient`].
+//! - Refit BVH, inside tests: [`mod@spatial::bvh`].
+//! - Self-intersections: [`mod@spatial::intersections`].
+//! - Depth image as a grid of points: [`mod@spatial::organised`].
+//! - Oracles: [`mod@spatial::brute`].
+//!
+//! Camera and files:
+//!
+//! - Projection: [`mod@camera::intrinsics`].
+//! - Noise of Kinect v1 and time-of-flight: [`mod@camera::noise`].
+//!
+//! Offline cloth:
+//!
+//! - Matrices of 3 × 3 blocks: [`mod@linear::block_matrix`].
+//!
+//! Picture:
+//!
+//! - Rasteriser: [`mod@raster::fast`].
+//! - Occluded triangles: [`mod@raster::hiz`].
+#![allow(rustdoc::private_intra_doc_links)] // the index of ideas names private modules
+
+pub mod camera;
+pub mod fixtures;
+pub mod linear;
+pub mod math;
+pub mod mesh;
+pub mod par;
+pub mod raster;
+pub mod spatial;

@@ -1,0 +1,19 @@
+//! Neighbours fast: refit BVH (closest, overlap, ray parity), hash grid, kd-tree (the only file naming kiddo), organised image, each beside its brute-force oracle.
+
+mod brute;
+mod bvh;
+mod chessboard;
+mod hash_grid;
+mod intersections;
+mod kdtree;
+mod organised;
+mod triangle;
+
+pub use brute::nearest_brute_force;
+pub use bvh::{Bvh, Position, SurfacePoint};
+pub use chessboard::chessboard_distances;
+pub use hash_grid::HashGrid;
+pub use intersections::{Intersection, SelfIntersections, intersections};
+pub use kdtree::PointTree;
+pub use organised::{Label, OrganisedCloud};
+pub use triangle::closest_on_triangle;

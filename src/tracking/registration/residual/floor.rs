@@ -1,0 +1,205 @@
+//! Floor residual: the joints of a hidden foot stand at their known height over the floor; a planted foot keeps its
+//! ankle's place and its direction.
+
+use super::{Residual, RowTerm};
+use crate::registration::{Dof, ROOT_UNKNOWNS, is_ancestor};
+use nalgebra::Vector3;
+use tryon_geometry::math::P3d;
+use tryon_geometry::spatial::{Label, OrganisedCloud};
+
+/// Foot of one leg and the joint angles that move it.
+#[derive(Clone, Debug)]
+pub struct FootChain {
+    /// Ankle, then ball: joint and its height over the floor in a standing foot, metres.
+    pub soles: Vec<(usize, f64)>,
+    /// Joint angles from the hip down.
+    pub angles: Vec<usize>,
+}
+
+/// Floor under the subject, camera frame.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FloorPlane {
+    /// Unit vector against gravity.
+    pub up: Vector3<f64>,
+    /// Height of the floor along it, metres.
+    pub height: f64,
+}
+
+/// Weights per point of a frame.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FloorWeights {
+    /// Height of a standing joint. It decides against a knee without readings (2·10⁻⁵ per squared radian at a lever of
+    /// 40 cm); a seen knee takes no part.
+    pub height: f64,
+    /// The same for a planted foot: smaller, as an estimated floor is off by 1 to 2 cm, which an almost straight leg
+    /// turns into a decimetre of the foot (docs/decisions).
+    pub planted_height: f64,
+    /// Horizontal place of a planted ankle.
+    pub place: f64,
+    /// Horizontal direction of a planted foot, at the distance of its ball from the ankle.
+    pub direction: f64,
+}
+
+impl Default for FloorWeights {
+    fn default() -> Self {
+        Self {
+            height: 1e-2,
+            planted_height: 2e-3,
+            place: 1e-3,
+            direction: 1e-2,
+        }
+    }
+}
+
+/// Width of the kernel on heights, metres: a foot on a stool is farther off and not pulled down.
+const KERNEL: f64 = 0.15;
+
+/// Hidden joints of one foot.
+#[derive(Clone, Copy)]
+pub struct FloorResidual<'a> {
+    /// Foot and angles.
+    pub foot: &'a FootChain,
+    /// Floor.
+    pub floor: FloorPlane,
+    /// Remembered positions of ankle and ball when the foot is planted.
+    pub planted: Option<[Vector3<f64>; 2]>,
+    /// Joints of the posed body, camera frame.
+    pub joints: &'a [P3d],
+    /// Parent of each joint.
+    pub parents: &'a [Option<usize>],
+    /// All degrees of freedom, as twists about `centre`.
+    pub dofs: &'a [Dof],
+    /// Origin of the twists.
+    pub centre: &'a Vector3<f64>,
+    /// Share (0 to 1) of each joint angle that no reading holds: only that share moves.
+    pub unseen: &'a [f64],
+    /// Readings: a joint in view follows them and is left out.
+    pub grid: &'a OrganisedCloud,
+    /// Weights.
+    pub weights: FloorWeights,
+}
+
+/// True for a joint whose cell has a reading of anything: it follows readings instead of the floor.
+pub fn is_in_view(grid: &OrganisedCloud, joint: &P3d) -> bool {
+    let home = grid
+        .cell_of(&joint.cast())
+        .and_then(|(u, v)| grid.cell(u, v));
+    home.is_some_and(|k| grid.labels[k] != Label::Unknown)
+}
+
+impl FloorResidual<'_> {
+    /// Velocity of a joint per unit of a degree of freedom, metres.
+    fn velocity(&self, joint: usize, dof: &Dof) -> Vector3<f64> {
+        if is_ancestor(self.parents, dof.bone, joint) {
+            let at = self.joints[joint].coords - self.centre;
+            dof.twist.velocity_at(&at)
+        } else {
+            Vector3::zeros()
+        }
+    }
+
+    /// Visits one row: `off` along `along` for `joint`, relative to the joint `from` where there is one.
+    fn row(
+        &self,
+        (joint, from): (usize, Option<usize>),
+        off: &Vector3<f64>,
+        along: &Vector3<f64>,
+        weight: f64,
+        visit: &mut impl FnMut(&RowTerm<'_>),
+    ) {
+        let slope = |&k: &usize| {
+            let dof = &self.dofs[ROOT_UNKNOWNS + k];
+            let base = from.map_or_else(Vector3::zeros, |f| self.velocity(f, dof));
+            along.dot(&(self.velocity(joint, dof) - base)) * self.unseen[k]
+        };
+        let slopes: Vec<f64> = self.foot.angles.iter().map(slope).collect();
+        visit(&RowTerm {
+            angles: &self.foot.angles,
+            slopes: &slopes,
+            residual: along.dot(off),
+            weight,
+        });
+    }
+}
+
+impl Residual for FloorResidual<'_> {
+    type Term<'t> = RowTerm<'t>;
+
+    fn for_each(&self, mut visit: impl FnMut(&RowTerm<'_>)) {
+        let up = self.floor.up;
+        let (Some(&(ankle, _)), Some(across)) = (
+            self.foot.soles.first(),
+            up.cross(&Vector3::z()).try_normalize(0.0),
+        ) else {
+            return;
+        };
+        for (part, &(joint, height)) in self.foot.soles.iter().enumerate() {
+            let at = self.joints[joint];
+            if is_in_view(self.grid, &at) {
+                continue;
+            }
+            let off = self.floor.height + height - up.dot(&at.coords);
+            let weight = match self.planted {
+                Some(_) => self.weights.planted_height,
+                None => self.weights.height,
+            };
+            let weight = weight * (KERNEL * KERNEL / (KERNEL * KERNEL + off * off)).powi(2);
+            self.row((joint, None), &(up * off), &up, weight, &mut visit);
+            let Some([kept_ankle, kept_ball]) = self.planted else {
+                continue;
+            };
+            let (from, off, weight) = if part == 0 {
+                (None, kept_ankle - at.coords, self.weights.place)
+            } else {
+                let now = at - self.joints[ankle];
+                let kept = kept_ball - kept_ankle;
+                (Some(ankle), kept - now, self.weights.direction)
+            };
+            for along in [across, up.cross(&across)] {
+                self.row((joint, from), &off, &along, weight, &mut visit);
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::registration::residual::check::Chain;
+    use tryon_geometry::camera::Intrinsics;
+
+    #[test]
+    fn derivatives_match_finite_differences() {
+        let grid = OrganisedCloud::new(&Intrinsics::KINECT_V1, None);
+        let ball_and_ankle = [Vector3::new(0.1, 0.6, 2.0), Vector3::new(0.2, 0.6, 1.9)];
+        for planted in [None, Some(ball_and_ankle)] {
+            Chain::check_rows(|chain, x, weight, visit| {
+                let joints = chain.moved(x);
+                let floor = FloorResidual {
+                    foot: &FootChain {
+                        soles: vec![(2, 0.05), (3, 0.02)],
+                        angles: chain.angles.clone(),
+                    },
+                    floor: FloorPlane {
+                        up: -Vector3::y(),
+                        height: -0.7,
+                    },
+                    planted,
+                    joints: &joints,
+                    parents: &chain.parents,
+                    dofs: &chain.dofs,
+                    centre: &chain.centre,
+                    unseen: &[1.0; 4],
+                    grid: &grid,
+                    weights: FloorWeights {
+                        height: weight,
+                        planted_height: 0.5 * weight,
+                        place: 2.0 * weight,
+                        direction: weight,
+                    },
+                };
+                floor.for_each(visit);
+            });
+        }
+    }
+}

@@ -1,0 +1,161 @@
+//! The body that is expected in a frame: which component it lies on, and where others begin who stand beside it.
+
+use super::components::{Component, ComponentMap};
+use tryon_geometry::spatial::{OrganisedCloud, chessboard_distances};
+
+/// Difference in depth up to which a reading is the expected body's, metres: a sprint between two frames.
+const SAME_BODY: f32 = 0.3;
+/// Area of the person over that of the expected body from which something else may be among it.
+const LARGER: f32 = 1.25;
+/// Distance from the expected body, across the view, within which cells stay the person's then, metres: a fast hand moves
+/// by 0.1 between two frames.
+const AROUND: f32 = 0.15;
+
+/// Area of an expected body below which nothing is split, m²: a head alone.
+const LEAST_AREA: f32 = 0.08;
+
+/// Depth of the body in each cell, infinity beside it, metres, shape `[cells]`; empty when nothing is expected.
+#[derive(Clone, Copy)]
+pub(super) struct ExpectedBody<'a>(pub(super) &'a [f32]);
+
+/// Area of a cell at depth `z` that faces the camera, m².
+fn cell_area(cloud: &OrganisedCloud, z: f32) -> f32 {
+    let [fx, fy] = cloud.focal();
+    z * z / (fx * fy)
+}
+
+impl ExpectedBody<'_> {
+    /// The component with the largest area on the body, where that is more than `least`, m².
+    pub(super) fn covering<'m>(
+        self,
+        cloud: &OrganisedCloud,
+        map: &'m ComponentMap,
+        least: f32,
+    ) -> Option<&'m Component> {
+        let mut areas = vec![0.0f32; map.list.len()];
+        for (i, z) in self.0.iter().enumerate() {
+            let id = map.of_cell[i];
+            if id != ComponentMap::NONE && (cloud.depth[i] - z).abs() < SAME_BODY {
+                areas[id as usize] += cell_area(cloud, cloud.depth[i]);
+            }
+        }
+        let of = |c: &Component| areas[c.id as usize];
+        let covering = map.list.iter().filter(|c| of(c) > least);
+        covering.max_by(|a, b| of(a).total_cmp(&of(b)).then(b.id.cmp(&a.id)))
+    }
+
+    /// Distance from the body beyond which cells are not the person's, cells, with the distances in `to_body`; `None` unless
+    /// the members are larger than the body, so that something else may be among them.
+    pub(super) fn split_limit(
+        self,
+        cloud: &OrganisedCloud,
+        map: &ComponentMap,
+        members: &[bool],
+        to_body: &mut Vec<u16>,
+    ) -> Option<u16> {
+        let drawn = self.0.iter().filter(|z| z.is_finite());
+        let (expected, depth, cells) = drawn.fold((0.0, 0.0, 0.0f32), |(area, depth, n), z| {
+            (area + cell_area(cloud, *z), depth + z, n + 1.0)
+        });
+        let own = map.list.iter().filter(|c| members[c.id as usize]);
+        let area: f32 = own.map(|c| c.area).sum();
+        if expected < LEAST_AREA || area < LARGER * expected {
+            return None;
+        }
+        chessboard_distances(cloud, |k| self.0[k].is_finite(), |_| u16::MAX, to_body);
+        let focal = cloud.focal()[0].max(cloud.focal()[1]);
+        Some((AROUND * focal * cells / depth).round() as u16)
+    }
+}
+
+/// Takes components out of the members of which less than half lies within the limit of the body.
+pub(super) fn drop_others(
+    map: &ComponentMap,
+    main: &Component,
+    (to_body, limit): (&[u16], u16),
+    members: &mut [bool],
+) {
+    let mut near = vec![0usize; map.list.len()];
+    for (id, distance) in map.of_cell.iter().zip(to_body) {
+        if *id != ComponentMap::NONE && *distance <= limit {
+            near[*id as usize] += 1;
+        }
+    }
+    for c in map.list.iter().filter(|c| c.id != main.id) {
+        members[c.id as usize] &= 2 * near[c.id as usize] >= c.cells;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::segment::fixture::cloud_of;
+    use crate::segment::{PersonChoice, PersonPrior, ScenePlanes, SegmentScratch, find_person};
+    use tryon_geometry::math::P3;
+    use tryon_geometry::spatial::OrganisedCloud;
+
+    /// Two boxes of 0.4 × 1.4 m side by side at 2 m, whose gap is closed or not.
+    fn pair(touching: bool) -> OrganisedCloud {
+        cloud_of(|x, y| {
+            let (x, y) = (x * 2.0, y * 2.0);
+            let is_box = (0.2..0.6).contains(&x.abs()) && y.abs() < 0.7;
+            let is_bridge = touching && x.abs() < 0.2 && y.abs() < 0.1;
+            if is_box || is_bridge { 2000 } else { 0 }
+        })
+    }
+
+    /// Columns of the person's first and last cell.
+    fn columns(cloud: &mut OrganisedCloud, body: &[f32]) -> Option<(usize, usize)> {
+        let prior = PersonPrior {
+            centre: P3::new(0.0, 0.0, 2.0),
+            reach: 0.8,
+            body,
+        };
+        let scene = ScenePlanes::default();
+        let choice = PersonChoice::Near(prior);
+        let found = find_person(cloud, &scene, choice, &mut SegmentScratch::default());
+        let columns = found.cells.iter().map(|c| *c as usize % cloud.size().0);
+        Some((columns.clone().min()?, columns.max()?))
+    }
+
+    #[test]
+    fn a_neighbour_is_neither_taken_for_the_person_nor_added() {
+        for touching in [false, true] {
+            for right in [false, true] {
+                let mut cloud = pair(touching);
+                let half = cloud.size().0 / 2;
+                let is_own = |k: usize| (k % cloud.size().0 >= half) == right;
+                let cells = 0..cloud.depth.len();
+                let is_box = |k: usize| {
+                    let p = cloud.centre(k);
+                    cloud.depth[k] > 0.0 && p.x.abs() > 0.2
+                };
+                let body: Vec<f32> = cells
+                    .map(|k| {
+                        if is_box(k) && is_own(k) {
+                            2.05
+                        } else {
+                            f32::INFINITY
+                        }
+                    })
+                    .collect();
+                let (first, last) = columns(&mut cloud, &body).expect("a person");
+                // 15 cm beyond the body are 10 cells, and 20 cm separate it from the middle.
+                assert!(
+                    (first >= half) == right && (last >= half) == right,
+                    "{first} {last}"
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn without_an_expected_body_the_largest_component_is_taken_whole() {
+        let nothing = vec![f32::INFINITY; pair(true).depth.len()];
+        for body in [vec![], nothing] {
+            let mut cloud = pair(true);
+            let half = cloud.size().0 / 2;
+            let (first, last) = columns(&mut cloud, &body).expect("a person");
+            assert!(first < half && last > half);
+        }
+    }
+}

@@ -1,0 +1,147 @@
+//! Data uploaded for each picture. Layouts are those of `garments.wgsl`; padding has a name.
+
+use crate::ImagePyramid;
+use crate::appearance::{Fabric, Print};
+use crate::area::{Area, NEAR};
+use crate::contact_shadow::{ContactShadows, NO_SHADOW, SHADOW_DEPTH};
+use crate::coverage::FOLD_GAP;
+use crate::shading::Shader;
+use crate::surface::Surface;
+use crate::viewport::Viewport;
+use bytemuck::{Pod, Zeroable};
+use std::sync::Arc;
+
+/// `Scene` of the shader.
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+#[repr(C)]
+pub(super) struct SceneData {
+    lens: [f32; 4],
+    size: [f32; 4],
+    camera: [f32; 4],
+    area: [f32; 4],
+    up: [f32; 4],
+    key: [f32; 4],
+    light: [f32; 4],
+    limits: [f32; 4],
+}
+
+impl SceneData {
+    pub(super) fn new(
+        viewport: &Viewport,
+        area: &Area,
+        samples: u32,
+        behind: f32,
+        shader: &Shader<'_>,
+    ) -> Self {
+        let k = viewport.sample_camera(area, samples);
+        let lens = [k.fx, k.fy, k.cx + 0.5, k.cy + 0.5].map(|v| v as f32);
+        let (k, l) = (&viewport.camera, &shader.lights);
+        let around = [area.width.div_ceil(2), area.height.div_ceil(2)];
+        Self {
+            lens,
+            size: [
+                (area.width * samples) as f32,
+                (area.height * samples) as f32,
+                NEAR,
+                samples as f32,
+            ],
+            camera: [k.fx, k.fy, k.cx, k.cy].map(|v| v as f32),
+            area: [
+                area.left as f32,
+                area.top as f32,
+                around[0] as f32,
+                around[1] as f32,
+            ],
+            up: [shader.up.x, shader.up.y, shader.up.z, l.sky],
+            key: [shader.key.x, shader.key.y, shader.key.z, l.key],
+            light: [l.ground, l.inside, l.contact, shader.brightness],
+            limits: [FOLD_GAP, SHADOW_DEPTH, NO_SHADOW, behind],
+        }
+    }
+}
+
+/// `Fabric` of the shader.
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+#[repr(C)]
+pub(super) struct FabricData {
+    base: [f32; 4],
+    other: [f32; 4],
+    pattern: [f32; 4],
+    /// First texel, columns, rows and levels of an image.
+    image: [u32; 4],
+}
+
+impl FabricData {
+    /// A fabric whose image, if it has one, starts at texel `first`.
+    fn new(f: &Fabric, first: u32) -> Self {
+        let mut image = [0; 4];
+        let pattern = match &f.print {
+            Print::Solid => [0.0, 1.0, 0.0, 0.0],
+            &Print::Stripes { period, .. } => [1.0, period, 0.0, 0.0],
+            &Print::Check { period, .. } => [2.0, period, 0.0, 0.0],
+            &Print::Knit { period } => [3.0, period, 0.0, 0.0],
+            Print::Scale { .. } => [4.0, f.low[0], f.low[1], f.low[2]],
+            Print::Image(pyramid) => {
+                let [width, height, levels] = pyramid.shape();
+                image = [first, width, height, levels];
+                [5.0, pyramid.metres_per_texel(), 0.0, 0.0]
+            }
+        };
+        Self {
+            base: [f.base[0], f.base[1], f.base[2], f.gloss],
+            other: [f.other[0], f.other[1], f.other[2], f.metres_per_uv],
+            pattern,
+            image,
+        }
+    }
+}
+
+/// Images of the fabrics of a surface.
+pub(super) fn images(surface: &Surface) -> impl Iterator<Item = &Arc<ImagePyramid>> {
+    surface.fabrics.iter().filter_map(|f| match &f.print {
+        Print::Image(pyramid) => Some(pyramid),
+        _ => None,
+    })
+}
+
+/// Flag of an owner seen from inside, above the garment's number.
+const INNER: u32 = 256;
+
+/// Bytes of the storage buffers of the geometry, in the order of their bindings.
+pub(super) fn geometry(surface: &Surface) -> [Vec<u8>; 5] {
+    let points: Vec<[f32; 4]> = surface
+        .vertices
+        .iter()
+        .map(|p| [p.x, p.y, p.z, 1.0])
+        .collect();
+    let owners: Vec<u32> = surface
+        .garment
+        .iter()
+        .zip(&surface.inner)
+        .map(|(g, i)| u32::from(*g) + u32::from(*i) * INNER)
+        .collect();
+    let mut first = 0;
+    let fabrics: Vec<FabricData> = surface
+        .fabrics
+        .iter()
+        .map(|f| {
+            let data = FabricData::new(f, first);
+            if let Print::Image(pyramid) = &f.print {
+                first += pyramid.texels().len() as u32;
+            }
+            data
+        })
+        .collect();
+    [
+        bytemuck::cast_slice(&points).to_vec(),
+        bytemuck::cast_slice(&surface.faces).to_vec(),
+        bytemuck::cast_slice(&owners).to_vec(),
+        bytemuck::cast_slice(&surface.attributes).to_vec(),
+        bytemuck::cast_slice(&fabrics).to_vec(),
+    ]
+}
+
+/// Bytes of the shadow image.
+pub(super) fn shadow_texels(shadows: &ContactShadows) -> &[u8] {
+    bytemuck::cast_slice(&shadows.around)
+}

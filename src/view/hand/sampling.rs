@@ -1,0 +1,98 @@
+//! Colours of the tracked body's parts in the captured picture, and the skin classifier fitted to them.
+
+use crate::area::NEAR;
+use crate::arm::ArmAxis;
+use crate::evidence::depth_sigma;
+use crate::limbs::Limbs;
+use crate::skin::SkinClassifier;
+use crate::state::{ColorRegion, State};
+use crate::viewport::Viewport;
+use tryon_geometry::camera::ColorImage;
+use tryon_geometry::math::P3;
+
+/// Captured picture and depth.
+pub(crate) struct CapturedPixels<'a> {
+    pub(crate) viewport: &'a Viewport,
+    /// The captured picture at the output's size.
+    pub(crate) image: &'a ColorImage,
+    /// Captured depth, millimetres, shape `viewport.depth`.
+    pub(crate) depth: &'a [u16],
+}
+
+/// Posed body in the picture's camera, metres.
+pub(crate) struct PosedLimbs<'a> {
+    pub(crate) limbs: &'a Limbs,
+    pub(crate) vertices: &'a [P3],
+}
+
+/// Largest depth difference of a captured point on a tracked limb, metres: tracked limbs are right to 3 cm.
+const LIMB_TOLERANCE: f32 = 0.03;
+/// The same on the trunk, whose clothes hang loosely.
+const TRUNK_TOLERANCE: f32 = 0.06;
+/// Distance from an arm's axis within which nothing counts as trunk, metres.
+const ARM_CLEARANCE: f32 = 0.09;
+/// Distance of the four test points from a sampled point, depth pixels: rejects outlines.
+const SAMPLE_RADIUS: f64 = 2.0;
+
+impl CapturedPixels<'_> {
+    /// Captured depth at a pixel, metres; 0 = none.
+    pub(super) fn metres(&self, u: u32, v: u32) -> f32 {
+        let at = (self.viewport.depth_at(0, u), self.viewport.depth_at(1, v));
+        let (Some(x), Some(y)) = at else { return 0.0 };
+        f32::from(self.depth[(y * self.viewport.depth[0] + x) as usize]) * 1e-3
+    }
+
+    /// Colour at `p` if the captured surface there and around it is the body's, within `tolerance` metres.
+    fn color(&self, p: &P3, tolerance: f32) -> Option<[u8; 3]> {
+        if p.z.is_nan() || p.z <= NEAR {
+            return None;
+        }
+        let q = self.viewport.camera.project(p);
+        let away = (SAMPLE_RADIUS * self.viewport.pixels_per_depth()) as f32;
+        let is_inside = |x: f32, side: u32| x >= away && x + away + 1.0 < side as f32;
+        if !is_inside(q.x, self.image.width()) || !is_inside(q.y, self.image.height()) {
+            return None;
+        }
+        let is_body = |(dx, dy): (f32, f32)| {
+            let (u, v) = (q.x + dx * away + 0.5, q.y + dy * away + 0.5);
+            let z = self.metres(u as u32, v as u32);
+            z > 0.0 && (z - p.z).abs() < tolerance + depth_sigma(z)
+        };
+        let around = [(0.0, 0.0), (1.0, 0.0), (-1.0, 0.0), (0.0, 1.0), (0.0, -1.0)];
+        (around.into_iter().all(is_body))
+            .then(|| self.image.at((q.x + 0.5) as u32, (q.y + 0.5) as u32))
+    }
+}
+
+/// Samples this picture's colours into `state` and fits the classifier; `None` if colour does not separate skin.
+pub(super) fn sample_and_fit(
+    state: &mut State,
+    view: &CapturedPixels<'_>,
+    body: &PosedLimbs<'_>,
+    axes: &[Option<ArmAxis>; 2],
+) -> Option<SkinClassifier> {
+    let is_by_arm = |p: &P3| {
+        let mut axes = axes.iter().flatten();
+        axes.any(|a| a.coordinates(p).distance < ARM_CLEARANCE)
+    };
+    let mut sample = |region: ColorRegion, vertices: &[u32], tolerance: f32| {
+        let due: Vec<(usize, u32)> = state.due(region, vertices).collect();
+        for (slot, v) in due {
+            let p = &body.vertices[v as usize];
+            if region == ColorRegion::Trunk && is_by_arm(p) {
+                continue;
+            }
+            if let Some(rgb) = view.color(p, tolerance) {
+                state.put(region, slot, rgb);
+            }
+        }
+    };
+    let [left, right] = &body.limbs.arms;
+    let forearms = [&left.forearm[..], &right.forearm].concat();
+    let hands = [&left.hand[..], &right.hand].concat();
+    sample(ColorRegion::Forearm, &forearms, LIMB_TOLERANCE);
+    sample(ColorRegion::Hand, &hands, LIMB_TOLERANCE);
+    sample(ColorRegion::Face, &body.limbs.face, LIMB_TOLERANCE);
+    sample(ColorRegion::Trunk, &body.limbs.trunk, TRUNK_TOLERANCE);
+    state.fit_skin()
+}

@@ -1,0 +1,104 @@
+//! The captured image and the garments in one picture: visibility, shading, edges.
+//!
+//! Two passes (Ye et al. 2014, section 5): the captured pixels at their depth, then the garments with a depth test.
+//! The test is decided by area, not by pixel (`occluder`): sensor noise is as large as the gap between chest and shirt.
+//! [`render()`] runs the stages: captured picture, rasterisation, vertex shading, visibility, blending.
+//!
+//! ```
+//! use tryon_geometry::camera::{Calibration, ColorImage, DepthImage, Intrinsics, RgbdFrame};
+//! use tryon_view::{Appearance, GarmentView, Input, Model, State, Workspace, render};
+//! use tryon_geometry::math::P3;
+//!
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! let camera = Intrinsics::KINECT_V1.resized(64, 48);
+//! let frame = RgbdFrame {
+//!     sequence: 0,
+//!     time_ns: 0,
+//!     depth: DepthImage::new(64, 48, vec![2500; 64 * 48])?, // a wall at 2.5 m
+//!     color: Some(ColorImage::filled(64, 48, [90; 3])),
+//! };
+//! let cloth = [[-0.3, 0.3, 2.0], [0.3, 0.3, 2.0], [0.0, -0.3, 2.0]].map(P3::from);
+//! let garment = GarmentView {
+//!     vertices: &cloth,
+//!     faces: &[[0, 1, 2]],
+//!     uv: &[],
+//!     normals: &[],
+//!     appearance: &Appearance::default(),
+//! };
+//! let input = Input {
+//!     frame: &frame,
+//!     calibration: &Calibration::registered(camera),
+//!     garments: &[garment],
+//!     body: None,
+//!     output: None,
+//! };
+//! let (mut state, mut work) = (State::default(), Workspace::default());
+//! let (picture, report) = render(&Model::default(), &mut state, &input, &mut work)?;
+//! assert_ne!(picture.at(32, 24), [90; 3]);
+//! assert_eq!(picture.at(2, 2), [90; 3]);
+//! assert!(report.pixels_drawn > 50 && report.pixels_occluded == 0);
+//! # Ok(())
+//! # }
+//! ```
+//!
+//! # Ideas
+//!
+//! - Captured pixels, then garments: [`mod@captured`], [`mod@blend`].
+//! - Garment or person in front, with and without a depth reading: [`mod@evidence`].
+//! - Patches that hide cloth: [`mod@occluder`].
+//! - Soft edges: [`mod@matte`].
+//! - Depth moved to the colour camera: [`mod@captured_depth`].
+//! - Garments beside the recorded person: [`mod@off_person`], [`mod@silhouette_grid`].
+//! - Bare hands by colour: [`mod@hand::detect`].
+//! - Light: [`mod@shading`], [`mod@contact_shadow`].
+//! - Fabric colour and prints: [`mod@appearance`].
+//! - Images on fabric: [`mod@image_pyramid`].
+//! - Card or processor: [`mod@gpu::choice`].
+//! - Shaders: [`mod@gpu::pipelines`].
+#![allow(rustdoc::private_intra_doc_links)] // the index of ideas names private modules
+
+pub(crate) mod appearance;
+pub(crate) mod area;
+mod arm;
+mod blend;
+mod body_depth;
+mod captured;
+pub(crate) mod captured_depth;
+pub(crate) mod composition;
+mod config;
+pub(crate) mod contact_shadow;
+pub(crate) mod coverage;
+mod evidence;
+#[cfg(feature = "gpu")]
+pub mod gpu;
+mod hand;
+mod image_pyramid;
+mod input;
+mod limbs;
+mod matte;
+mod occluder;
+mod off_person;
+mod render;
+mod report;
+pub(crate) mod shading;
+mod silhouette_grid;
+mod skin;
+pub(crate) mod srgb;
+mod state;
+pub(crate) mod surface;
+#[cfg(test)]
+pub(crate) mod tests;
+mod vertex_shading;
+pub(crate) mod viewport;
+mod workspace;
+
+pub use appearance::{Appearance, Print};
+pub use config::{Config, Framing, Lights, Margins, Model};
+pub use image_pyramid::ImagePyramid;
+pub use input::{BodyView, GarmentView, Input, RenderError};
+pub use limbs::Limbs;
+pub use off_person::OffPerson;
+pub use render::render;
+pub use report::{HandReport, RenderReport};
+pub use state::State;
+pub use workspace::Workspace;

@@ -1,0 +1,30 @@
+//! `tryon-bench`: run time against error, and what trains the data that is checked in.
+#![allow(
+    clippy::print_stdout,
+    reason = "tables on standard output are for people and scripts"
+)]
+
+mod args;
+mod ccd;
+mod measure;
+mod progress;
+mod train_parts;
+
+use args::{Cli, Command};
+use clap::Parser;
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    let outcome = match Cli::parse().command {
+        Command::Tracking(a) => measure::tracking(&a),
+        Command::Cloth(a) => measure::cloth(&a),
+        Command::People(a) => measure::people(&a),
+        Command::Clothcap(a) => measure::clothcap(&a),
+        Command::Ccd(a) => ccd::run(&a),
+        Command::TrainParts(a) => train_parts::run(&a),
+    };
+    outcome.unwrap_or_else(|e| {
+        eprintln!("tryon-bench: {e:#}");
+        ExitCode::FAILURE
+    })
+}

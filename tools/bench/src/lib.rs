@@ -1,0 +1,55 @@
+//! Run time against error: standard scenes, methods side by side, tables and plots behind `tryon-bench`.
+//!
+//! A benchmark fills a [`Table`]; [`Table::write`] leaves it as CSV, JSON and one SVG plot per measure of error.
+//!
+//! # Ideas
+//!
+//! Segmentation:
+//!
+//! - Its score: [`mod@parts`].
+//!
+//! Evidence:
+//!
+//! - Standard scenes, the paper's failures rebuilt: [`mod@scenes`].
+//! - Corrupted depth: [`mod@corruptions`].
+//! - Joint and surface errors: [`mod@tracking`].
+//! - Captured garments against truth: [`mod@garment_capture::score`].
+//! - The dance: [`mod@dance`].
+//! - Dressed scans with truth per point: [`mod@scans::scene`].
+//! - Ablation: [`mod@ablation`].
+//! - Everyone who walks in, the bars of a release: [`mod@people::plan`], a file a row beside it.
+#![allow(rustdoc::private_intra_doc_links)] // the index of ideas names private modules
+
+pub mod ablation;
+pub mod ccd;
+pub mod cloth;
+pub mod cloth_offline;
+mod corruptions;
+pub mod dance;
+mod dance_bodies;
+mod depth_scene;
+pub mod dress_offline;
+mod error;
+pub mod garment_capture;
+mod inside;
+mod outfit;
+pub mod parts;
+pub mod parts_recorded;
+pub mod people;
+mod plot;
+pub mod rest;
+pub mod scans;
+pub mod scenes;
+mod sewn_sheet;
+pub mod stills;
+mod table;
+pub mod tracking;
+mod write;
+
+pub use dance_bodies::DanceBodies;
+pub use depth_scene::{DepthScene, SceneTruth};
+pub use error::EvaluateError;
+pub use inside::Solid;
+pub use outfit::OutfitSpec;
+pub use plot::run_time_against_error;
+pub use table::{Row, Table};

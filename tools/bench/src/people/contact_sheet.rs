@@ -1,0 +1,166 @@
+//! Contact sheets: shaded depth images with true and tracked joints, many in one picture.
+
+use super::common_joints::Points;
+use crate::EvaluateError;
+use std::path::Path;
+use tryon_formats::image::write_png_rgb;
+use tryon_geometry::camera::{ColorImage, DepthImage, Intrinsics};
+use tryon_geometry::math::P3d;
+
+/// Size of one cell, pixels, and cells in a row.
+const CELL: [u32; 2] = [240, 180];
+const COLUMNS: usize = 8;
+/// Most cells of one sheet.
+const MOST: usize = 160;
+/// Colours of the truth and of the tracked joints, sRGB.
+const TRUE: [u8; 3] = [60, 200, 60];
+const TRACKED: [u8; 3] = [230, 60, 40];
+/// Pairs of common joints that a bone connects.
+const BONES: [[usize; 2]; 15] = [
+    [0, 1],
+    [0, 2],
+    [2, 4],
+    [1, 3],
+    [3, 5],
+    [6, 7],
+    [6, 8],
+    [8, 10],
+    [7, 9],
+    [9, 11],
+    [0, 6],
+    [1, 7],
+    [13, 12],
+    [0, 13],
+    [1, 13],
+];
+
+/// Pictures in rows.
+#[derive(Clone, Debug, Default)]
+pub(super) struct ContactSheet {
+    cells: Vec<Vec<u8>>,
+}
+
+impl ContactSheet {
+    /// Adds a depth image with its true and tracked joints; nothing once the sheet is full.
+    pub(super) fn add(
+        &mut self,
+        camera: &Intrinsics,
+        depth: &DepthImage,
+        truth: Option<&Points>,
+        tracked: Option<&Points>,
+    ) {
+        if self.cells.len() >= MOST {
+            return;
+        }
+        let scale = f64::max(
+            f64::from(depth.width()) / f64::from(CELL[0]),
+            f64::from(depth.height()) / f64::from(CELL[1]),
+        );
+        let mut cell = shaded(depth, scale);
+        for (points, color) in [(truth, TRUE), (tracked, TRACKED)] {
+            let Some(points) = points else { continue };
+            let place = |p: &P3d| {
+                let q = camera.project(&p.cast::<f32>());
+                (p.z > 0.1).then(|| [f64::from(q.x) / scale, f64::from(q.y) / scale])
+            };
+            for [a, b] in BONES {
+                if let (Some(a), Some(b)) = (place(&points[a]), place(&points[b])) {
+                    line(&mut cell, a, b, color);
+                }
+            }
+        }
+        self.cells.push(cell);
+    }
+
+    /// Writes the sheet as `NAME.png` into `dir`; nothing without cells.
+    ///
+    /// # Errors
+    /// Names the file that cannot be written.
+    pub(super) fn write(&self, dir: &Path, name: &str) -> Result<(), EvaluateError> {
+        if self.cells.is_empty() {
+            return Ok(());
+        }
+        let fault = |why: String| EvaluateError::Scene {
+            scene: name.to_owned(),
+            why,
+        };
+        let columns = COLUMNS.min(self.cells.len());
+        let rows = self.cells.len().div_ceil(columns);
+        let [w, h] = CELL.map(|n| n as usize);
+        let mut data = vec![255u8; 3 * w * columns * h * rows];
+        for (k, cell) in self.cells.iter().enumerate() {
+            let (x, y) = (k % columns * w, k / columns * h);
+            for row in 0..h {
+                let at = 3 * ((y + row) * w * columns + x);
+                data[at..at + 3 * w].copy_from_slice(&cell[3 * row * w..3 * (row + 1) * w]);
+            }
+        }
+        let image = ColorImage::new((w * columns) as u32, (h * rows) as u32, data)
+            .map_err(|e| fault(e.to_string()))?;
+        std::fs::create_dir_all(dir).map_err(|e| fault(e.to_string()))?;
+        write_png_rgb(&dir.join(format!("{name}.png")), &image).map_err(|e| fault(e.to_string()))
+    }
+}
+
+/// Grey picture of a depth image, lit from the camera, darker with distance.
+fn shaded(depth: &DepthImage, scale: f64) -> Vec<u8> {
+    let [w, h] = CELL;
+    let mut out = Vec::with_capacity(3 * (w * h) as usize);
+    for v in 0..h {
+        for u in 0..w {
+            let (x, y) = ((f64::from(u) * scale) as i32, (f64::from(v) * scale) as i32);
+            let inside = x < depth.width() as i32 && y < depth.height() as i32;
+            let z = if inside { depth.at(x, y) } else { 0 };
+            let grey = if z == 0 {
+                if inside { 20 } else { 255 }
+            } else {
+                let near = |d: u16| if d == 0 { f64::from(z) } else { f64::from(d) };
+                let slope = |a: u16, b: u16| (near(a) - near(b)) / f64::from(z) * 80.0;
+                let (gx, gy) = (
+                    slope(depth.at(x + 3, y), depth.at(x - 3, y)),
+                    slope(depth.at(x, y + 3), depth.at(x, y - 3)),
+                );
+                let light = 1.0 / (1.0 + gx * gx + gy * gy).sqrt();
+                let far = (f64::from(z) / 5000.0).clamp(0.0, 0.8);
+                (40.0 + 215.0 * light * (1.0 - far)) as u8
+            };
+            out.extend([grey; 3]);
+        }
+    }
+    out
+}
+
+/// A straight line of single pixels; parts outside are left out.
+fn line(cell: &mut [u8], a: [f64; 2], b: [f64; 2], color: [u8; 3]) {
+    let steps = (b[0] - a[0]).abs().max((b[1] - a[1]).abs()).ceil();
+    if !steps.is_finite() || steps > 2000.0 {
+        return;
+    }
+    for i in 0..=steps as usize {
+        let t = i as f64 / steps.max(1.0);
+        let (x, y) = (a[0] + (b[0] - a[0]) * t, a[1] + (b[1] - a[1]) * t);
+        if x >= 0.0 && y >= 0.0 && x < f64::from(CELL[0]) && y < f64::from(CELL[1]) {
+            let at = 3 * (y as usize * CELL[0] as usize + x as usize);
+            cell[at..at + 3].copy_from_slice(&color);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_sheet_of_empty_images_is_written_and_one_without_cells_is_not() {
+        let dir = tempfile::tempdir().expect("folder");
+        let camera = Intrinsics::KINECT_V1;
+        let mut sheet = ContactSheet::default();
+        sheet.write(dir.path(), "none").expect("nothing to do");
+        assert!(!dir.path().join("none.png").exists());
+        let far = [P3d::new(9e9, 0.0, 1.0); 14];
+        let image = DepthImage::empty(640, 480);
+        sheet.add(&camera, &image, Some(&far), Some(&[P3d::origin(); 14]));
+        sheet.write(dir.path(), "one").expect("written");
+        assert!(dir.path().join("one.png").exists());
+    }
+}

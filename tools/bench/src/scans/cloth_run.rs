@@ -1,0 +1,168 @@
+//! Garments put on a subject and simulated from pose to pose.
+
+use super::skinned::{BoundGarment, SkinnedGarment};
+use tryon::mirror::Choice;
+use tryon_body::measure::measure;
+use tryon_body::{BoneTransforms, Pose, RestBody, Template, skin};
+use tryon_cloth::{Input, Workspace, step};
+use tryon_dressing::{DressOptions, Dressed, GarmentSource, dress_all};
+use tryon_garment::GarmentMesh;
+use tryon_geometry::math::{P3, P3d, World};
+use tryon_geometry::par::Par;
+
+/// Steps at the first pose before the first scan: dressed cloth still sways.
+const SETTLING_STEPS: usize = 12;
+
+/// Least distance of a skinned garment from the skin or the skinned garment below it, at rest (m).
+const SKINNED_GAP: f32 = 3e-3;
+
+/// Garment of a scanned outfit.
+#[derive(Clone, Debug)]
+pub struct ScanGarment {
+    /// Garment and its size.
+    pub choice: Choice,
+    /// Layer on the body, 0 innermost; `None` for the garment's own. Meshes keep their own.
+    ///
+    /// A shirt of layer 0 under trousers of layer 1 is tucked in.
+    pub layer: Option<u8>,
+}
+
+impl From<Choice> for ScanGarment {
+    fn from(choice: Choice) -> Self {
+        Self {
+            choice,
+            layer: None,
+        }
+    }
+}
+
+/// Body and cloth in one pose of a motion.
+pub(super) struct ClothRun<'a> {
+    template: &'a Template,
+    rest: &'a RestBody,
+    /// `None` for a subject without garments.
+    dressed: Option<Dressed>,
+    skinned: Vec<BoundGarment>,
+    work: Workspace,
+    bones: BoneTransforms,
+    body: Vec<P3>,
+    /// Largest 99th percentile of the stretch so far.
+    pub(super) strain: f64,
+}
+
+impl<'a> ClothRun<'a> {
+    /// Dresses a body in its first pose and lets the cloth settle for some steps of `dt` (s).
+    ///
+    /// `edge` is the edge length of garments cut from patterns (m).
+    pub(super) fn new(
+        (template, rest): (&'a Template, &'a RestBody),
+        pose: &Pose<World>,
+        (garments, skinned): (&[ScanGarment], &[SkinnedGarment]),
+        (edge, dt): (f64, f64),
+    ) -> Result<Self, String> {
+        let gaps = (1..).map(|layer: u16| SKINNED_GAP * f32::from(layer));
+        let bound = skinned.iter().zip(gaps);
+        let bound = bound.map(|(g, gap)| g.bind((template, rest), gap));
+        let mut run = Self {
+            skinned: bound.collect::<Result<_, _>>()?,
+            template,
+            rest,
+            dressed: None,
+            work: Workspace::default(),
+            bones: BoneTransforms::default(),
+            body: Vec::new(),
+            strain: 0.0,
+        };
+        if !garments.is_empty() {
+            run.dressed = Some(put_on((template, rest), pose, garments, edge)?);
+            for _ in 0..SETTLING_STEPS {
+                run.step(pose, dt)?;
+            }
+            run.strain = 0.0;
+        }
+        run.step(pose, dt)?;
+        Ok(run)
+    }
+
+    /// Moves the body to a pose and the cloth by `dt` (s).
+    pub(super) fn step(&mut self, pose: &Pose<World>, dt: f64) -> Result<(), String> {
+        pose.bones(self.template.skeleton(), self.rest, &mut self.bones);
+        skin(
+            Par::Rayon,
+            &self.rest.vertices,
+            self.template.weights(),
+            &self.bones,
+            &mut self.body,
+        );
+        for garment in &mut self.skinned {
+            garment.pose(&self.bones);
+        }
+        let Some(dressed) = &mut self.dressed else {
+            return Ok(());
+        };
+        let input = Input {
+            body: &self.body,
+            dt,
+        };
+        let report = step(&dressed.model, &mut dressed.state, &input, &mut self.work);
+        let report = report.map_err(|e| e.to_string())?;
+        self.strain = self.strain.max(report.p99_strain);
+        Ok(())
+    }
+
+    /// Skin as the cloth met it, world (m): parts that press on each other are apart.
+    pub(super) fn body(&self) -> &[P3] {
+        let collision = self
+            .dressed
+            .as_ref()
+            .map(|d| d.state.collision_body().vertices());
+        collision.unwrap_or(&self.body)
+    }
+
+    /// Joints of the posed skeleton, world (m).
+    pub(super) fn joints(&self) -> &[P3d] {
+        &self.bones.joints
+    }
+
+    /// Garments with the positions of their simulation vertices, innermost first; skinned ones lie over simulated ones.
+    pub(super) fn garments(&self) -> impl Iterator<Item = (&GarmentMesh, &[P3])> {
+        let simulated = self.dressed.iter().flat_map(|d| {
+            let meshes = d.model.outfit.garments.iter();
+            let states = d.state.garments.iter().map(|g| g.positions.as_slice());
+            meshes.zip(states)
+        });
+        simulated.chain(self.skinned.iter().map(BoundGarment::surface))
+    }
+}
+
+/// Garments of any size on a body, each pattern in the size that was chosen or that fits best, meshes made to measure.
+fn put_on(
+    (template, rest): (&Template, &RestBody),
+    pose: &Pose<World>,
+    garments: &[ScanGarment],
+    edge: f64,
+) -> Result<Dressed, String> {
+    let measures = measure(template, rest).map_err(|e| e.to_string())?;
+    let mut patterns = Vec::new();
+    for garment in garments {
+        let sized = garment.choice.sized(&measures).map_err(|e| e.to_string())?;
+        let mut pattern = sized.pattern().cloned();
+        if let (Some(pattern), Some(layer)) = (&mut pattern, garment.layer) {
+            pattern.layer = layer;
+        }
+        patterns.push(pattern);
+    }
+    let sources = garments.iter().zip(&patterns);
+    let sources: Vec<GarmentSource<'_>> = sources
+        .filter_map(|(garment, pattern)| match (&garment.choice, pattern) {
+            (Choice::Mesh { garment, .. }, _) => Some(GarmentSource::Mesh(garment)),
+            (_, pattern) => pattern.as_ref().map(GarmentSource::Pattern),
+        })
+        .collect();
+    let mut options = DressOptions {
+        any_size: true,
+        ..DressOptions::default()
+    };
+    options.triangulation.edge_length = edge;
+    dress_all(template, rest, pose, &sources, &options).map_err(|e| e.to_string())
+}

@@ -1,0 +1,200 @@
+//! One colour and depth camera before the subject: frames as a sensor delivers them, with the label of each pixel.
+
+use super::STRAY_LABEL;
+use super::paint::{ScenePaint, shade};
+use super::surface::SceneSurface;
+use tryon_geometry::camera::{
+    Calibration, ColorImage, DepthImage, Intrinsics, NoiseModel, RgbdFrame,
+};
+use tryon_geometry::math::{Camera, P3, P3d, Rigid, V3d, World};
+use tryon_geometry::mesh::Face;
+use tryon_geometry::par::Par;
+use tryon_geometry::raster::{Options, View, VisibilityBuffer, barycentrics, rasterise_with};
+
+/// Half the side of the floor and of the wall (m).
+const ROOM: f32 = 4.0;
+/// Distance of the wall behind the subject (m).
+const WALL: f32 = -1.6;
+/// Colours of floor and wall, sRGB.
+const ROOM_COLORS: [[u8; 3]; 2] = [[150, 112, 76], [196, 194, 188]];
+/// Near plane (m).
+const NEAR: f32 = 0.3;
+
+/// Depth camera with registered colour, before a subject at the origin of the world, on a floor and before a wall.
+#[derive(Clone, Debug, PartialEq)]
+pub struct DepthCamera {
+    /// Projection.
+    pub intrinsics: Intrinsics,
+    /// Pose; the world's floor is y = 0.
+    pub world_from_camera: Rigid<World, Camera>,
+    /// Noise of the depth image.
+    pub noise: NoiseModel,
+}
+
+impl Default for DepthCamera {
+    /// A Kinect v1 mounted upright, one metre high and 1.9 m from the subject.
+    fn default() -> Self {
+        let wide = Intrinsics::KINECT_V1;
+        let at: Rigid<World, World> = Rigid::from_parts(
+            V3d::new(0.0, 0.0, 1.9),
+            nalgebra::UnitQuaternion::identity(),
+        );
+        Self {
+            intrinsics: Intrinsics {
+                width: wide.height,
+                height: wide.width,
+                cx: wide.cy,
+                cy: wide.cx,
+                ..wide
+            },
+            world_from_camera: at * Rigid::<World, Camera>::level(1.0),
+            noise: NoiseModel::KinectV1,
+        }
+    }
+}
+
+/// Room around the subject.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Backdrop {
+    /// A floor, and a wall behind the subject.
+    Wall,
+    /// A floor only.
+    Floor,
+}
+
+/// Images without noise. Shapes: `[pixels]`.
+#[derive(Clone, Debug)]
+pub(super) struct CleanView {
+    /// Depth (m); infinite where nothing is seen.
+    pub(super) depth: Vec<f32>,
+    /// Colours, sRGB.
+    pub(super) color: Vec<[u8; 3]>,
+    /// Garment from 1, skin, or [`STRAY_LABEL`] beside the subject.
+    pub(super) labels: Vec<u8>,
+}
+
+impl DepthCamera {
+    /// Calibration of the frames.
+    pub fn calibration(&self) -> Calibration {
+        Calibration::registered(self.intrinsics)
+    }
+
+    /// Frame number `index` of a painted surface, `rate` a second, and the label of each pixel.
+    pub(super) fn shoot(
+        &self,
+        painted: (&SceneSurface, &ScenePaint),
+        index: usize,
+        (seed, rate): (u64, f64),
+    ) -> (RgbdFrame, Vec<u8>) {
+        let clean = self.view(painted, Backdrop::Wall);
+        let depth: DepthImage =
+            (self.noise).apply(&self.intrinsics, &clean.depth, seed, index as u64);
+        let Intrinsics { width, height, .. } = self.intrinsics;
+        let color = ColorImage::new(width, height, clean.color.concat());
+        let frame = RgbdFrame {
+            sequence: index as u64,
+            time_ns: (index as f64 / rate * 1e9) as u64,
+            depth,
+            color: color.ok(),
+        };
+        (frame, clean.labels)
+    }
+
+    /// A painted surface in a room as a camera without noise sees it.
+    pub(super) fn view(
+        &self,
+        (surface, paint): (&SceneSurface, &ScenePaint),
+        backdrop: Backdrop,
+    ) -> CleanView {
+        let view = View::Perspective {
+            camera: self.intrinsics,
+            near: NEAR,
+        };
+        let mut drawn = surface.drawn.clone();
+        let mut faces = surface.faces.clone();
+        add_room(&mut drawn, &mut faces, backdrop);
+        let mut local = Vec::new();
+        (self.world_from_camera.inverse()).points_f32(&drawn, &mut local);
+        let mut buffer = VisibilityBuffer::default();
+        let options = Options {
+            par: Par::Rayon,
+            ..Options::default()
+        };
+        rasterise_with(options, &view, &local, &faces, &mut buffer);
+
+        let eye = self.world_from_camera.point(&P3d::origin()).cast::<f32>();
+        let width = self.intrinsics.width;
+        let seen = |(i, face): (usize, &u32)| {
+            let pixel = [i as u32 % width, i as u32 / width].map(|c| c as f32);
+            match faces.get(*face as usize) {
+                Some(corners) if (*face as usize) < surface.faces.len() => {
+                    let at = corners.map(|v| local[v as usize]);
+                    let weights = barycentrics(&view, at, pixel[0], pixel[1]);
+                    let label = surface.labels[corners[0] as usize];
+                    let weights = weights.unwrap_or([1.0, 0.0, 0.0]);
+                    (label, lit((surface, paint), corners, weights, &eye))
+                }
+                Some(_) => {
+                    let wall = *face as usize >= surface.faces.len() + 2;
+                    (STRAY_LABEL, ROOM_COLORS[usize::from(wall)])
+                }
+                None => (STRAY_LABEL, [0; 3]),
+            }
+        };
+        let (labels, color) = buffer.face.iter().enumerate().map(seen).unzip();
+        CleanView {
+            depth: buffer.depth,
+            color,
+            labels,
+        }
+    }
+}
+
+/// Colour of a place on the surface, lit from fixed directions.
+fn lit(
+    (surface, paint): (&SceneSurface, &ScenePaint),
+    face: &Face,
+    weights: [f32; 3],
+    eye: &P3,
+) -> [u8; 3] {
+    let normal = SceneSurface::blend(&surface.normals, face, weights);
+    let place = SceneSurface::place(&surface.drawn, face, weights);
+    let normal = if normal.dot(&(eye - place)) < 0.0 {
+        -normal
+    } else {
+        normal
+    };
+    let normal = normal.try_normalize(f32::MIN_POSITIVE).unwrap_or_default();
+    let material = SceneSurface::blend(&surface.material, face, weights);
+    let light = shade(&normal, 1.0);
+    let color = paint.color(surface.labels[face[0] as usize], &material);
+    color.map(|c| (c * light).clamp(0.0, 255.0) as u8)
+}
+
+/// Adds two triangles of floor, then two of wall if there is one.
+fn add_room(vertices: &mut Vec<P3>, faces: &mut Vec<Face>, backdrop: Backdrop) {
+    let (back, count) = match backdrop {
+        Backdrop::Wall => (WALL, 2),
+        Backdrop::Floor => (-ROOM, 1),
+    };
+    let quads = [
+        [
+            [-ROOM, 0.0, back],
+            [ROOM, 0.0, back],
+            [ROOM, 0.0, ROOM],
+            [-ROOM, 0.0, ROOM],
+        ],
+        [
+            [-ROOM, 0.0, back],
+            [ROOM, 0.0, back],
+            [ROOM, ROOM, back],
+            [-ROOM, ROOM, back],
+        ],
+    ];
+    for quad in &quads[..count] {
+        let first = vertices.len() as u32;
+        vertices.extend(quad.map(P3::from));
+        faces.push([first, first + 1, first + 2]);
+        faces.push([first, first + 2, first + 3]);
+    }
+}

@@ -1,0 +1,106 @@
+//! Virtual body scanner: visible points or triangles of a surface, with noise.
+
+use super::camera_rig::CameraRig;
+use super::paint::{ScenePaint, tinted_shade};
+use super::points::ScanPoints;
+use super::random::{ScanSeed, gauss};
+use super::sampling::{SurfaceSample, sample, visible_mesh};
+use super::surface::SceneSurface;
+use super::view::ViewRing;
+use tryon_geometry::math::V3;
+
+/// Settings of the scanner.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ScannerSetting {
+    /// Visible points before holes; unused for a mesh.
+    pub points: usize,
+    /// Standard deviation of the depth noise along the view (m).
+    pub noise: f64,
+    /// Standard deviation of each tangential component of a normal.
+    pub normal_noise: f64,
+    /// Standard deviation of colour components, of 255.
+    pub color_noise: f64,
+    /// Colour of the lights: share by which the main light is warmer and the fill light colder than white.
+    pub light_tint: f32,
+    /// Output of the visible triangles in place of a cloud.
+    pub is_meshed: bool,
+    /// Depth cameras in place of the scanner; of the settings above only `points` matters to them.
+    pub rig: Option<CameraRig>,
+}
+
+impl Default for ScannerSetting {
+    /// A cloud of 150,000 points with 0.7 mm noise.
+    fn default() -> Self {
+        Self {
+            points: 150_000,
+            noise: 7e-4,
+            normal_noise: 0.08,
+            color_noise: 3.0,
+            light_tint: 0.0,
+            is_meshed: false,
+            rig: None,
+        }
+    }
+}
+
+/// Stages with random numbers of their own.
+const SAMPLING: u64 = 1;
+const NOISE: u64 = 2;
+const COLOR_NOISE: u64 = 3;
+const NORMAL_NOISE: u64 = 4;
+
+impl ScannerSetting {
+    /// Scans a surface.
+    pub(super) fn scan(
+        &self,
+        surface: &SceneSurface,
+        paint: &ScenePaint,
+        seed: ScanSeed,
+    ) -> ScanPoints {
+        if let Some(rig) = &self.rig {
+            return rig.scan((surface, paint), self.points, seed);
+        }
+        let ring = ViewRing::draw(surface, surface.center());
+        let openness = ring.openness(surface);
+        let candidates = ring.candidates(surface, &openness);
+        let (samples, faces) = if self.is_meshed {
+            visible_mesh(surface, &ring, &candidates)
+        } else {
+            let mut rng = seed.stage(SAMPLING);
+            let samples = sample(surface, &ring, &candidates, self.points, &mut rng);
+            (samples, Vec::new())
+        };
+        let brightness: Vec<V3> = (surface.normals.iter().zip(&openness))
+            .map(|(n, open)| tinted_shade(n, *open, self.light_tint))
+            .collect();
+        let mut out = ScanPoints {
+            faces,
+            ..ScanPoints::default()
+        };
+        let [mut depth, mut tint, mut tilt] =
+            [NOISE, COLOR_NOISE, NORMAL_NOISE].map(|stage| seed.stage(stage));
+        for s in &samples {
+            let color = lit_color(surface, paint, &brightness, s);
+            let color = color.map(|c| (c + gauss(&mut tint, self.color_noise)).clamp(0.0, 255.0));
+            let point = s.point + s.toward * gauss(&mut depth, self.noise);
+            let off = V3::from_fn(|_, _| gauss(&mut tilt, self.normal_noise));
+            let normal = (s.normal + off).try_normalize(0.0).unwrap_or(s.normal);
+            out.push(point, normal, color, s.label);
+        }
+        out
+    }
+}
+
+/// Lit colour of a sample; `brightness` has the shape `[vertices]`.
+fn lit_color(
+    surface: &SceneSurface,
+    paint: &ScenePaint,
+    brightness: &[V3],
+    s: &SurfaceSample,
+) -> [f32; 3] {
+    let face = &surface.faces[s.face as usize];
+    let material = SceneSurface::blend(&surface.material, face, s.weights);
+    let light = SceneSurface::blend(brightness, face, s.weights);
+    let color = paint.color(s.label, &material);
+    std::array::from_fn(|k| color[k] * light[k])
+}
