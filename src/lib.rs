@@ -5,6 +5,58 @@
 //!
 //! Start at [`mirror`], or at its steps: [`tracking`], [`cloth`] and [`view`].
 //!
+//! # Tracking
+//!
+//! ```
+//! use tryon::body::embedded;
+//! use tryon::synth::{Actor, Routine, Sequence, Setting};
+//! use tryon::tracking::{TrackerConfig, TrackerModel, TrackerState, Workspace, step};
+//!
+//! // A synthetic subject before a depth camera; `formats::open_recording` reads recorded ones.
+//! let setting = Setting { routine: Routine::Still, color: false, ..Setting::default() };
+//! let sequence = Sequence::new(Actor::default(), setting);
+//! let model = TrackerModel::new(
+//!     embedded::template(),
+//!     sequence.calibration().clone(),
+//!     TrackerConfig { samples: 300, ..TrackerConfig::default() },
+//! );
+//! let (mut state, mut workspace) = (TrackerState::new(&model), Workspace::default());
+//! for i in 0..2 {
+//!     let (frame, _) = sequence.frame(i);
+//!     let report = step(&model, &mut state, &frame, &mut workspace)?;
+//!     assert!(report.status.is_live() && report.residual_mm < 10.0);
+//! }
+//! // Vertices of the tracked body, camera frame, metres, shape `[vertices]`.
+//! let (vertices, _bones) = workspace.posed(&model, &state);
+//! assert_eq!(vertices.len(), model.template().mesh().vertices().len());
+//! # Ok::<(), tryon::tracking::StepError>(())
+//! ```
+//!
+//! # Cloth
+//!
+//! ```
+//! use tryon::body::{BodyShape, Pose, embedded};
+//! use tryon::cloth::{Input, Workspace, step};
+//! use tryon::dressing::{DressOptions, dress};
+//! use tryon::garment::{Size, library};
+//! use tryon::geometry::math::Rigid;
+//!
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! let template = embedded::template();
+//! let rest = template.personalise(&BodyShape::default());
+//! let pose = Pose::rest(template.skeleton(), Rigid::identity());
+//! let pattern = library::pattern("tank", Size::M)?;
+//! let mut dressed = dress(&template, &rest, &pose, &[pattern], &DressOptions::default())?;
+//!
+//! let body = &rest.vertices; // posed skin of each frame (m)
+//! let mut workspace = Workspace::default();
+//! let input = Input { body, dt: 1.0 / 30.0 };
+//! let report = step(&dressed.model, &mut dressed.state, &input, &mut workspace)?;
+//! assert!(report.kept_last_good.is_none());
+//! # Ok(())
+//! # }
+//! ```
+//!
 //! # Ideas
 //!
 //! Cloth:

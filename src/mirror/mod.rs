@@ -4,10 +4,10 @@
 //! [`choice`](Choice) and [`DressedOutfit`] in cloth, [`PosedBody`] and [`CameraGarments`] in the compositor.
 //!
 //! ```
-//! use tryon_body::embedded;
+//! use tryon::body::embedded;
 //! use tryon::mirror::{Choice, Mirror};
-//! use tryon_formats::RgbdSource;
-//! use tryon_synth::{Sequence, Setting, Actor, SynthSource};
+//! use tryon::formats::RgbdSource;
+//! use tryon::synth::{Sequence, Setting, Actor, SynthSource};
 //!
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
 //! let scene = Sequence::new(Actor::default(), Setting::default());

@@ -1,30 +1,5 @@
 //! One step from a frame and the last state to pose, displacements and a confidence report.
 //!
-//! ```
-//! use tryon_body::embedded;
-//! use tryon_synth::{Actor, Routine, Sequence, Setting};
-//! use tryon_tracking::{TrackerConfig, TrackerModel, TrackerState, Workspace, step};
-//!
-//! // A synthetic subject before a depth camera; `formats::open_recording` reads recorded ones.
-//! let setting = Setting { routine: Routine::Still, color: false, ..Setting::default() };
-//! let sequence = Sequence::new(Actor::default(), setting);
-//! let model = TrackerModel::new(
-//!     embedded::template(),
-//!     sequence.calibration().clone(),
-//!     TrackerConfig { samples: 300, ..TrackerConfig::default() },
-//! );
-//! let (mut state, mut workspace) = (TrackerState::new(&model), Workspace::default());
-//! for i in 0..2 {
-//!     let (frame, _) = sequence.frame(i);
-//!     let report = step(&model, &mut state, &frame, &mut workspace)?;
-//!     assert!(report.status.is_live() && report.residual_mm < 10.0);
-//! }
-//! // Vertices of the tracked body, camera frame, metres, shape `[vertices]`.
-//! let (vertices, _bones) = workspace.posed(&model, &state);
-//! assert_eq!(vertices.len(), model.template().mesh().vertices().len());
-//! # Ok::<(), tryon_tracking::StepError>(())
-//! ```
-//!
 //! # Ideas
 //!
 //! Segmentation:

@@ -1,29 +1,6 @@
 //! One step of garment motion against a moving body, `filter → collide → solve → commit → sleep`: `model/` (sheet, membrane, bending, partition), `solver/` (explicit, xpbd, implicit behind one trait), `sleep/`, `repair/`.
 //!
 //! The real-time simulator follows Ye et al. 2014, section 4, "Near Realtime simulation".
-//!
-//! ```
-//! use tryon_body::{BodyShape, Pose, embedded};
-//! use tryon_cloth::{Input, Workspace, step};
-//! use tryon_dressing::{DressOptions, dress};
-//! use tryon_garment::{Size, library};
-//! use tryon_geometry::math::Rigid;
-//!
-//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
-//! let template = embedded::template();
-//! let rest = template.personalise(&BodyShape::default());
-//! let pose = Pose::rest(template.skeleton(), Rigid::identity());
-//! let pattern = library::pattern("tank", Size::M)?;
-//! let mut dressed = dress(&template, &rest, &pose, &[pattern], &DressOptions::default())?;
-//!
-//! let body = &rest.vertices; // posed skin of each frame (m)
-//! let mut workspace = Workspace::default();
-//! let input = Input { body, dt: 1.0 / 30.0 };
-//! let report = step(&dressed.model, &mut dressed.state, &input, &mut workspace)?;
-//! assert!(report.kept_last_good.is_none());
-//! # Ok(())
-//! # }
-//! ```
 
 mod collide;
 mod collision;

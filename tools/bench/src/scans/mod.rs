@@ -4,7 +4,7 @@
 //! virtual cameras. Scans are functions of the scene: the same bits every time.
 //!
 //! ```no_run
-//! use tryon::evaluate::scans::{ScanScene, write_scan_folder};
+//! use tryon_bench::scans::{ScanScene, write_scan_folder};
 //!
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
 //! let scene = ScanScene {
