@@ -9,9 +9,7 @@
 //! - Skinning (eq. 4): [`mod@skinning`].
 //! - Lengths of bones without change of girth (eq. 18 to 20), displacements on the template: [`mod@shape`].
 //! - Parts, limbs, joint names: [`mod@parts::joints`], [`mod@parts::vertices`].
-//! - The embedded figure: [`mod@embedded::figure`] (proportions), [`mod@embedded::field`] (surface),
-//!   [`mod@embedded::rig`], [`mod@embedded::directions`] (shape space), [`mod@embedded::statistics`] (published
-//!   measurements).
+//! - The embedded figure: [`mod@embedded`], read by [`mod@template_file`].
 //! - Tape measures: [`mod@measure::tape`].
 //! - A skeleton for a bare scan: [`mod@rig`], `src/dressing/rig_standing.rs`.
 //!
@@ -39,6 +37,7 @@ mod skeleton;
 mod skin_weights;
 mod skinning;
 mod template;
+mod template_file;
 
 pub use error::BodyError;
 pub use pose::{BoneTransforms, Pose};

@@ -1,10 +1,11 @@
 //! Linear shape space of a template.
 
 use nalgebra::Vector3;
+use serde::{Deserialize, Serialize};
 use tryon_geometry::math::V3;
 
 /// Linear directions of body shape.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct ShapeSpace {
     /// Name of each direction.
     pub names: Vec<String>,

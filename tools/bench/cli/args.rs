@@ -29,6 +29,8 @@ pub(crate) enum Command {
     Clothcap(ClothcapArgs),
     /// Query sets of continuous collision detection with truth: missed impacts, false alarms, time a query.
     Ccd(CcdArgs),
+    /// Make the embedded body: the same bytes each time.
+    MakeBody(MakeBodyArgs),
     /// Train the classifier of body parts on synthetic people, and score it on others.
     TrainParts(TrainPartsArgs),
 }
@@ -179,4 +181,11 @@ pub(crate) struct CcdArgs {
     /// Print JSON instead of a table.
     #[arg(long)]
     pub(crate) json: bool,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct MakeBodyArgs {
+    /// File to write.
+    #[arg(long, value_name = "FILE", default_value = "src/body/embedded.bin")]
+    pub(crate) out: PathBuf,
 }

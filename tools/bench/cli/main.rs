@@ -6,6 +6,7 @@
 
 mod args;
 mod ccd;
+mod make_body;
 mod measure;
 mod progress;
 mod train_parts;
@@ -21,6 +22,7 @@ fn main() -> ExitCode {
         Command::People(a) => measure::people(&a),
         Command::Clothcap(a) => measure::clothcap(&a),
         Command::Ccd(a) => ccd::run(&a),
+        Command::MakeBody(a) => make_body::run(&a),
         Command::TrainParts(a) => train_parts::run(&a),
     };
     outcome.unwrap_or_else(|e| {

@@ -16,6 +16,8 @@
 //! - Captured garments against truth: [`mod@garment_capture::score`].
 //! - The dance: [`mod@dance`].
 //! - Dressed scans with truth per point: [`mod@scans::scene`].
+//! - The embedded body: [`mod@made_body::figure`] (proportions), [`mod@made_body::field`] (surface),
+//!   [`mod@made_body::rig`], [`mod@made_body::directions`] (shape space), [`mod@made_body::statistics`] (published measurements).
 //! - Ablation: [`mod@ablation`].
 //! - Everyone who walks in, the bars of a release: [`mod@people::plan`], a file a row beside it.
 #![allow(rustdoc::private_intra_doc_links)] // the index of ideas names private modules
@@ -31,6 +33,7 @@ mod depth_scene;
 pub mod dress_offline;
 mod error;
 pub mod garment_capture;
+pub mod made_body;
 mod inside;
 mod outfit;
 pub mod parts;

@@ -1,4 +1,4 @@
-//! The embedded body: a parametric human figure, generated at run time by deterministic code.
+//! Maker of the embedded body: a parametric human figure by deterministic code, written by `tryon-bench make-body`.
 //!
 //! Anatomy tables describe an implicit surface; its left half is polygonised, remeshed with finer triangles in
 //! face, hands and feet, mirrored, rigged and given directions of shape.
@@ -11,17 +11,14 @@ mod head;
 mod limbs;
 mod polygonise;
 mod rig;
-pub mod statistics;
+mod statistics;
 mod torso;
 
-use super::{BodyError, Skeleton, Template};
 use field::Field;
 use figure::{Figure, Joints, STATURE};
-use std::sync::{Arc, OnceLock};
+use tryon_body::{BodyError, Skeleton, Template};
 use tryon_geometry::math::{P3, P3d};
 use tryon_geometry::mesh::{Border, Face, RemeshSpec, Remesher, Topology, TriMesh};
-
-pub use directions::{DIRECTIONS, RANGE};
 
 /// Name of the template.
 const NAME: &str = "embedded";
@@ -166,21 +163,6 @@ pub fn generate() -> Result<Template, BodyError> {
         plain.weights().clone(),
         Some(space),
     )
-}
-
-/// The embedded body, generated on first use and shared.
-///
-/// # Panics
-/// Never in a build that passes its tests: generation has no input.
-pub fn template() -> Arc<Template> {
-    static TEMPLATE: OnceLock<Arc<Template>> = OnceLock::new();
-    #[expect(
-        clippy::expect_used,
-        reason = "generation has no input; a test generates it"
-    )]
-    TEMPLATE
-        .get_or_init(|| Arc::new(generate().expect("the embedded body fits together")))
-        .clone()
 }
 
 #[cfg(test)]

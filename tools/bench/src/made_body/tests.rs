@@ -2,8 +2,9 @@
 
 use super::statistics as stat;
 use super::*;
-use crate::measure::{Measurements, measure};
-use crate::{BodyShape, BoneTransforms, JointMotion, Pose, skin};
+use tryon_body::embedded::{DIRECTIONS, RANGE, template};
+use tryon_body::measure::{Measurements, measure};
+use tryon_body::{BodyShape, BoneTransforms, JointMotion, Pose, skin};
 use tryon_geometry::math::{Body, Rigid};
 use tryon_geometry::mesh::{face_normal, smallest_angle};
 use tryon_geometry::par::{Par, with_threads};
@@ -235,7 +236,7 @@ fn elbows_bend_forward_and_knees_backward() {
 }
 
 #[test]
-fn same_bits_on_any_number_of_threads() {
+fn the_file_is_made_again_bit_for_bit_on_any_number_of_threads() {
     let once = template();
     let again = with_threads(3, generate).expect("pool").expect("generated");
     assert_eq!(once.mesh(), again.mesh());

@@ -1,7 +1,7 @@
 //! The skeleton of the figure and its skinning weights.
 
 use super::figure::Joints;
-use crate::{BodyError, Joint, JointMotion, Skeleton, SkinWeights};
+use tryon_body::{BodyError, Joint, JointMotion, Skeleton, SkinWeights};
 use tryon_geometry::math::{P3d, V3d};
 use tryon_geometry::mesh::Topology;
 use tryon_geometry::mesh::smoothing::smoothed;

@@ -7,28 +7,13 @@
 use super::field::Field;
 use super::figure::{Figure, Joints};
 use super::{carve, rig, statistics as stat};
-use crate::measure::{Measurements, measure};
-use crate::parts::BodySegment;
-use crate::{BodyError, BodyShape, ShapeSpace, Skeleton, SkinWeights, Template};
+use tryon_body::measure::{Measurements, measure};
+use tryon_body::embedded::DIRECTIONS;
+use tryon_body::parts::BodySegment;
+use tryon_body::{BodyError, BodyShape, ShapeSpace, Skeleton, SkinWeights, Template};
 use tryon_geometry::math::{P3d, V3d};
 use tryon_geometry::mesh::smoothing::smoothed;
 use tryon_geometry::par::{self, Par};
-
-/// Names of the directions, in order; `sex` +1 is the mean man, −1 the mean woman.
-pub const DIRECTIONS: [&str; 9] = [
-    "stature",
-    "girth",
-    "sex",
-    "limb_length",
-    "torso_length",
-    "shoulder_width",
-    "chest",
-    "waist",
-    "hip",
-];
-
-/// Largest sound coefficient, standard deviations: spans 98.8 % of a normally distributed population.
-pub const RANGE: f64 = 2.5;
 
 /// Projection steps onto the changed surface; from the third on, no vertex moves by 0.1 mm.
 const STEPS: usize = 4;
