@@ -21,6 +21,7 @@ pub use prost::Message;
     missing_docs,
     unreachable_pub,
     clippy::all,
+    clippy::too_many_lines,
     clippy::unwrap_used,
     rustdoc::all
 )]

@@ -11,7 +11,7 @@ mod head;
 mod limbs;
 mod polygonise;
 mod rig;
-mod statistics;
+pub mod statistics;
 mod torso;
 
 use field::Field;
