@@ -1,6 +1,6 @@
 //! A template as bytes: its parts in postcard's compact form, compressed by deflate.
 
-use super::{BodyError, Joint, ShapeSpace, SkinWeights, Skeleton, Template};
+use super::{BodyError, Joint, ShapeSpace, Skeleton, SkinWeights, Template};
 use flate2::Compression;
 use flate2::read::{DeflateDecoder, DeflateEncoder};
 use serde::{Deserialize, Serialize};
@@ -43,7 +43,9 @@ impl Template {
         let mut bytes = Vec::new();
         #[expect(clippy::expect_used, reason = "memory takes every write")]
         postcard::to_stdvec(&file)
-            .map(|plain| DeflateEncoder::new(&plain[..], Compression::best()).read_to_end(&mut bytes))
+            .map(|plain| {
+                DeflateEncoder::new(&plain[..], Compression::best()).read_to_end(&mut bytes)
+            })
             .expect("serialisable")
             .expect("written to memory");
         bytes

@@ -1,15 +1,14 @@
 //! The chain of one person in front of one camera.
 
 use super::body::PosedBody;
-use super::choice::{Choice, SizedGarment};
-use super::clock::{FrameClock, LongGap};
+use super::choice::Choice;
 use super::error::MirrorError;
 use super::offline_outfit::OfflineOutfit;
 use super::outfit::{DressedOutfit, PutOn, Subject};
 use super::painter::{CapturedView, DrawnOutfit, OutfitPainter};
 use super::report::{MirrorFrame, StageTimer};
+use super::wear::{SizeState, Wear};
 use std::sync::Arc;
-use tryon_body::measure::measure;
 use tryon_body::{BodyShape, Pose, Template};
 use tryon_geometry::camera::{Calibration, ColorImage, RgbdFrame};
 use tryon_geometry::math::P3;
@@ -22,21 +21,17 @@ pub struct Mirror {
     tracker: TrackerModel,
     tracked: TrackerState,
     tracking_work: tryon_tracking::Workspace,
-    clock: FrameClock,
     worn: Option<Worn>,
     shape: Arc<BodyShape>,
     posed: PosedBody,
     painter: OutfitPainter,
-    notes: Vec<String>,
 }
 
 /// Garments on the subject and the appearance of each.
 #[derive(Debug)]
 struct Worn {
-    outfit: DressedOutfit,
+    wear: Wear,
     appearances: Vec<Appearance>,
-    /// Its sizes are those of a body whose size still changed.
-    is_provisional: bool,
     /// The tracker's number of the subject who wears it.
     subject: u64,
 }
@@ -51,12 +46,10 @@ impl Mirror {
             tracked: TrackerState::new(&tracker),
             tracker,
             tracking_work: tryon_tracking::Workspace::default(),
-            clock: FrameClock::default(),
             worn: None,
             shape: Arc::default(),
             posed: PosedBody::default(),
             painter,
-            notes: Vec::new(),
         }
     }
 
@@ -72,17 +65,15 @@ impl Mirror {
         let tracking = tryon_tracking::step(&self.tracker, &mut self.tracked, frame, work)?;
         timer.lap("tracking");
 
-        let dt = LongGap::Nominal.time_step(self.clock.gap(frame.time_ns));
         let body = self.live_body();
         let subject = self.tracked.subject;
-        (self.worn).take_if(|w| w.outfit.is_past_mending() || w.subject != subject);
-        if body.is_some() && self.is_dressing_due()? {
-            self.worn = Some(self.dress()?);
+        (self.worn).take_if(|w| w.wear.outfit().is_past_mending() || w.subject != subject);
+        if body.is_some() && self.follow()? {
             timer.lap("dressing");
         }
 
         let cloth = match &body {
-            Some(body) => self.simulate(body, dt)?,
+            Some(body) => self.simulate(body, frame.time_ns)?,
             None => None,
         };
         if cloth.is_some() {
@@ -94,7 +85,7 @@ impl Mirror {
         Ok(MirrorFrame {
             picture,
             is_dressed: cloth.is_some(),
-            is_size_provisional: self.worn.as_ref().is_some_and(|w| w.is_provisional),
+            is_size_provisional: self.is_size_provisional(),
             stages_ms: timer.stages_ms,
             tracking,
             cloth,
@@ -120,12 +111,12 @@ impl Mirror {
 
     /// Remarks about sizes and meshes; empty before the subject is dressed.
     pub fn notes(&self) -> &[String] {
-        &self.notes
+        self.worn.as_ref().map_or(&[], |w| w.wear.notes())
     }
 
     /// Outfit of the subject; `None` before the subject is dressed.
     pub fn outfit(&self) -> Option<&DressedOutfit> {
-        self.worn.as_ref().map(|w| &w.outfit)
+        self.worn.as_ref().map(|w| w.wear.outfit())
     }
 
     /// Colour and surface of each garment of the outfit; empty before the subject is dressed.
@@ -172,73 +163,49 @@ impl Mirror {
         Some(self.posed.vertices().to_vec())
     }
 
-    /// Nobody is dressed, or the size has settled and asks for other sizes than the provisional ones.
-    fn is_dressing_due(&mut self) -> Result<bool, MirrorError> {
-        let Some(worn) = &mut self.worn else {
-            return Ok(!self.choices.is_empty());
-        };
-        if !worn.is_provisional || self.tracked.status != Status::Tracking {
-            return Ok(false);
-        }
-        worn.is_provisional = false;
-        let sized = self.choose_sizes()?;
-        Ok(self.worn.as_ref().is_some_and(|w| !w.outfit.is_in(&sized)))
-    }
-
-    /// The chosen garments in the sizes of the tracked body, with their notes.
-    fn choose_sizes(&mut self) -> Result<Vec<SizedGarment>, MirrorError> {
-        let template = self.tracker.template();
-        let rest = template.personalise(&self.tracked.shape);
-        let measures = measure(template, &rest)?;
-        let sized = self.choices.iter().map(|c| c.sized(&measures));
-        let sized = sized.collect::<Result<Vec<_>, _>>()?;
-        self.notes = sized.iter().flat_map(|g| g.notes.iter().cloned()).collect();
-        Ok(sized)
-    }
-
-    fn dress(&mut self) -> Result<Worn, MirrorError> {
-        let sized = self.choose_sizes()?;
-        let template = self.tracker.template();
-        let rest = template.personalise(&self.tracked.shape);
+    /// Moves the worn garments with the subject, and puts the choices on where nothing is worn or in other sizes. True when
+    /// they were put on now.
+    fn follow(&mut self) -> Result<bool, MirrorError> {
+        let is_sized = self.tracked.status == Status::Tracking;
         let world_from_camera = self.tracked.world_from_camera;
         let pose = Pose {
             root: world_from_camera * self.tracked.pose.root,
             angles: self.tracked.pose.angles.clone(),
         };
         let subject = Subject {
-            template,
-            rest: &rest,
+            template: self.tracker.template(),
+            rest: self.posed.rest(),
             pose: &pose,
             world_from_camera,
         };
-        let mut outfit =
-            DressedOutfit::put_on(&subject, sized, PutOn::default()).map_err(MirrorError::Dress)?;
-        outfit.carry_to(&subject)?;
-        let appearance = |k: usize| {
-            let source = outfit.source(k).map(|s| &outfit.worn()[s]);
-            source.map_or_else(Appearance::default, |garment| Appearance {
-                base: garment.color(),
-                pattern: garment.image().map_or(Print::Solid, |image| {
-                    Print::Image(Arc::new(ImagePyramid::new(image)))
-                }),
-                ..Appearance::default()
-            })
-        };
-        let appearances = (0..outfit.model.outfit.garments.len())
-            .map(appearance)
-            .collect();
-        Ok(Worn {
-            outfit,
-            appearances,
-            is_provisional: self.tracked.status != Status::Tracking,
+
+        if let Some(worn) = &mut self.worn {
+            worn.wear.follow(&subject, is_sized)?;
+        }
+        let fits = (self.worn.as_ref()).is_some_and(|w| w.wear.sizes() != SizeState::Misfit);
+        if fits || self.choices.is_empty() {
+            return Ok(false);
+        }
+        let choices = self.choices.clone();
+        let mut wear = Wear::put_on(choices, &subject, is_sized, PutOn::default())?;
+        wear.follow(&subject, is_sized)?;
+        self.worn = Some(Worn {
+            appearances: appearances(wear.outfit()),
+            wear,
             subject: self.tracked.subject,
-        })
+        });
+        Ok(true)
+    }
+
+    fn is_size_provisional(&self) -> bool {
+        let worn = self.worn.as_ref();
+        worn.is_some_and(|w| w.wear.sizes() == SizeState::Provisional)
     }
 
     fn simulate(
         &mut self,
         body_camera: &[P3],
-        dt: f64,
+        time_ns: u64,
     ) -> Result<Option<tryon_cloth::StepReport>, MirrorError> {
         let Some(worn) = &mut self.worn else {
             return Ok(None);
@@ -246,7 +213,7 @@ impl Mirror {
         let mut body = Vec::new();
         let world_from_camera = &self.tracked.world_from_camera;
         world_from_camera.points_f32(body_camera, &mut body);
-        Ok(Some(worn.outfit.step(&body, dt)?))
+        Ok(Some(worn.wear.step(&body, time_ns)?.report))
     }
 
     fn draw(
@@ -255,12 +222,12 @@ impl Mirror {
         body: Option<&[P3]>,
     ) -> Result<(ColorImage, RenderReport), MirrorError> {
         let worn = self.worn.as_ref().filter(|_| body.is_some());
-        let positions = worn.map_or_else(Vec::new, |w| w.outfit.drawn_positions());
+        let positions = worn.map_or_else(Vec::new, |w| w.wear.outfit().drawn_positions());
         let outfit = worn.map(|worn| DrawnOutfit {
-            garments: &worn.outfit.model.outfit.garments,
+            garments: &worn.wear.outfit().model.outfit.garments,
             appearances: &worn.appearances,
             positions: &positions,
-            body: worn.outfit.state.collision_body().vertices(),
+            body: worn.wear.outfit().state.collision_body().vertices(),
         });
         let view = CapturedView {
             frame,
@@ -269,4 +236,21 @@ impl Mirror {
         };
         Ok(self.painter.paint(&view, outfit.as_ref(), body)?)
     }
+}
+
+/// Colour and surface of each garment of an outfit.
+fn appearances(outfit: &DressedOutfit) -> Vec<Appearance> {
+    let appearance = |k: usize| {
+        let source = outfit.source(k).map(|s| &outfit.worn()[s]);
+        source.map_or_else(Appearance::default, |garment| Appearance {
+            base: garment.color(),
+            pattern: garment.image().map_or(Print::Solid, |image| {
+                Print::Image(Arc::new(ImagePyramid::new(image)))
+            }),
+            ..Appearance::default()
+        })
+    };
+    (0..outfit.model.outfit.garments.len())
+        .map(appearance)
+        .collect()
 }

@@ -1,29 +1,16 @@
 //! Time step of the cloth from the capture times of frames.
 
-/// Time step when frames give none (s): a 30 Hz camera.
+/// Time step where frames give none [s]: a camera of 30 frames a second.
 pub(super) const NOMINAL: f64 = 1.0 / 30.0;
-/// Longest gap of a recording that counts as a time step (s); a longer one is a pause of the camera.
-const LONGEST_RECORDED: f64 = 0.2;
-/// Time steps of a live stream (s): a gap in the stream does not become one huge step.
-const LIVE: [f64; 2] = [1.0 / 120.0, 1.0 / 10.0];
+/// Time steps of the cloth [s]. A longer gap is a pause of the camera and no huge step; 0.2 s is a camera of 5 frames a second.
+const STEPS: [f64; 2] = [1.0 / 120.0, 0.2];
 
-/// Time step for a gap that no camera interval explains.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum LongGap {
-    /// A recording: the nominal interval of a camera.
-    Nominal,
-    /// A live stream: the gap, clamped.
-    Clamped,
-}
-
-impl LongGap {
-    /// Time step of the cloth for a gap between frames (s).
-    pub fn time_step(self, gap: f64) -> f64 {
-        match self {
-            Self::Nominal if gap > 0.0 && gap <= LONGEST_RECORDED => gap,
-            Self::Nominal => NOMINAL,
-            Self::Clamped => gap.clamp(LIVE[0], LIVE[1]),
-        }
+/// Time step of the cloth for a gap between frames [s].
+pub fn time_step(gap: f64) -> f64 {
+    if gap > 0.0 {
+        gap.clamp(STEPS[0], STEPS[1])
+    } else {
+        NOMINAL
     }
 }
 
@@ -41,7 +28,7 @@ impl FrameClock {
         }
     }
 
-    /// Time since the previous frame (s); 0 for the first frame and for one that is not later.
+    /// Time since the previous frame [s]; 0 for the first frame and for one that is not later.
     pub fn gap(&mut self, time_ns: u64) -> f64 {
         let last = self.last_ns.replace(time_ns).unwrap_or(time_ns);
         time_ns.saturating_sub(last) as f64 * 1e-9
@@ -55,15 +42,17 @@ mod tests {
     #[test]
     fn unusable_gaps_become_usable_steps() {
         let mut clock = FrameClock::default();
-        let gaps = [5_000_000_000u64, 5_040_000_000, 8_040_000_000, 1].map(|t| clock.gap(t));
-        assert_eq!(gaps, [0.0, 0.04, 3.0, 0.0]);
-        assert_eq!(
-            gaps.map(|g| LongGap::Nominal.time_step(g)),
-            [NOMINAL, 0.04, NOMINAL, NOMINAL]
-        );
-        assert_eq!(
-            gaps.map(|g| LongGap::Clamped.time_step(g)),
-            [LIVE[0], 0.04, LIVE[1], LIVE[0]]
-        );
+        let times = [
+            5_000_000_000u64,
+            5_040_000_000,
+            5_041_000_000,
+            8_041_000_000,
+            1,
+        ];
+        let gaps = times.map(|t| clock.gap(t));
+        assert_eq!(gaps, [0.0, 0.04, 0.001, 3.0, 0.0]);
+        let steps = [NOMINAL, 0.04, STEPS[0], STEPS[1], NOMINAL];
+        assert_eq!(gaps.map(time_step), steps);
+        assert_eq!(time_step(f64::NAN), NOMINAL);
     }
 }

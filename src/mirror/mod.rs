@@ -1,7 +1,7 @@
 //! Frame to picture for one person: track, choose size, dress, simulate, composite; the one chain that command line and services share.
 //!
 //! [`Mirror`] is the whole chain in one thread. The services run its parts in separate processes:
-//! [`choice`](Choice) and [`DressedOutfit`] in cloth, [`PosedBody`] and [`CameraGarments`] in the compositor.
+//! [`Wear`] in cloth, [`PosedBody`] and [`CameraGarments`] in the compositor.
 //!
 //! ```
 //! use tryon::body::embedded;
@@ -36,12 +36,13 @@ mod painter;
 mod picture;
 mod report;
 mod wear;
+mod wear_watch;
 
 pub use body::PosedBody;
 pub use captured::CapturedWardrobe;
 pub use chain::Mirror;
 pub use choice::{Choice, SizedGarment};
-pub use clock::{FrameClock, LongGap};
+pub use clock::{FrameClock, time_step};
 pub use error::MirrorError;
 pub use offline_drape::{OfflineDrapeLevel, OfflineDrapeReport};
 pub use offline_outfit::OfflineOutfit;
@@ -49,3 +50,4 @@ pub use outfit::{DressedOutfit, PutOn, Subject};
 pub use painter::OutfitPainter;
 pub use picture::{CameraGarments, DrawnBody, DrawnSurface, FollowedBody, library_appearance};
 pub use report::MirrorFrame;
+pub use wear::{SizeState, Wear, WearStep};

@@ -2,7 +2,7 @@
 
 use super::choice::SizedGarment;
 use super::clock::NOMINAL;
-use super::wear::{SETTLING, WearWatch};
+use super::wear_watch::{SETTLING, WearWatch};
 use std::sync::Arc;
 use tryon_body::parts::vertex_masks;
 use tryon_body::{BoneTransforms, Pose, RestBody, Template};

@@ -1,177 +1,166 @@
-//! Fit of a worn outfit from step to step, and its return to how it was put on.
+//! Garments on one subject over time: measured → sized → put on → stepped → sized anew or past mending.
+//!
+//! The one state machine of worn garments: command line, demo and cloth service use it.
 
-use tryon_body::parts::BodyPart;
-use tryon_cloth::{ClothError, Model, State, StepReport, WornReference};
+use super::choice::{Choice, SizedGarment};
+use super::clock::{FrameClock, time_step};
+use super::error::MirrorError;
+use super::outfit::{DressedOutfit, PutOn, Subject};
+use tryon_body::measure::{Measurements, measure};
+use tryon_cloth::{ClothError, StepReport};
 use tryon_geometry::math::P3;
 
-/// Stretch that one edge in a hundred exceeds in a garment that is caught or torn: dances reach 0.25 for a frame.
-const MOST_STRAIN: f64 = 0.25;
-/// Largest median distance of a limb's cloth from where skin would carry it, metres: dances reach 63 mm.
-const MOST_OFFSET: f32 = 0.08;
-/// Steps in a row with a sleeve off after which an outfit is put on again: cloth puts it back in the next one, or never.
-const PATIENCE: u32 = 2;
-/// Steps in which an outfit that was put on again settles: a sleeve that comes off then isn't left to cloth.
-pub(super) const SETTLING: u32 = 4;
-/// Unfit steps of an outfit that doesn't settle after which it must be dressed anew, which takes 0.3 to 0.7 s: one second.
-const MOST_VAIN: u32 = 30;
-/// Mean displacement of a body part that is a jump, metres, and its least speed, m/s: a fast arm moves by 0.2 m in 1/30 s.
-const JUMP: f32 = 0.25;
-/// See [`JUMP`].
-const JUMP_SPEED: f64 = 7.0;
-
-/// Fit of an outfit after one step.
+/// Worn sizes against those of the body.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Fit {
-    /// Worn as it was put on.
-    Worn,
-    /// Part of a sleeve is off its arm: cloth puts it back in the next step.
-    SleeveOff,
-    /// Past what cloth can be, or off its limbs.
-    Torn,
+pub enum SizeState {
+    /// The size of the body has not settled.
+    Provisional,
+    /// Sizes of the settled body.
+    Settled,
+    /// The settled body asks for other sizes: the garments are to be put on anew.
+    Misfit,
 }
 
-/// Fitness of an outfit over time.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-struct WearState {
-    /// Unfit steps in a row.
-    unfit: u32,
-    /// Steps since the outfit was put on again; `None` once it has settled.
-    settling: Option<u32>,
-    /// Unfit steps before it settled.
-    vain: u32,
+/// Chosen garments on a subject.
+#[derive(Debug)]
+pub struct Wear {
+    choices: Vec<Choice>,
+    outfit: DressedOutfit,
+    sizes: SizeState,
+    notes: Vec<String>,
+    clock: FrameClock,
 }
 
-impl WearState {
-    /// Takes the result of a step; true when the outfit must be put on again.
-    fn advance(&mut self, fit: Fit, jumped: bool) -> bool {
-        let is_unfit = fit != Fit::Worn;
-        self.unfit = if is_unfit { self.unfit + 1 } else { 0 };
-        let patience = self.settling.map_or(PATIENCE, |_| 1);
-        let put_on = jumped || fit == Fit::Torn || self.unfit >= patience;
-        let settled = self.settling.map(|n| n + 1).filter(|n| *n < SETTLING);
-        self.settling = if put_on { Some(0) } else { settled };
-        self.vain = match self.settling {
-            Some(_) => self.vain + u32::from(is_unfit),
-            None => 0,
+/// One step of the worn garments.
+#[derive(Debug)]
+pub struct WearStep {
+    /// Report of the cloth.
+    pub report: StepReport,
+    /// Time of the stream since the last step [s].
+    pub gap: f64,
+}
+
+impl Wear {
+    /// Puts the choices on in the sizes of the subject, whose size `is_sized` if it has settled. Takes about half a second;
+    /// [`Self::follow`] is to come next.
+    ///
+    /// # Errors
+    /// A body that cannot be measured; faults of the garments; without `how.any_size` a garment that does not fit.
+    pub fn put_on(
+        choices: Vec<Choice>,
+        subject: &Subject<'_>,
+        is_sized: bool,
+        how: PutOn,
+    ) -> Result<Self, MirrorError> {
+        let sized = sized(&choices, &measure(subject.template, subject.rest)?)?;
+        let notes = notes(&sized);
+        let outfit = DressedOutfit::put_on(subject, sized, how).map_err(MirrorError::Dress)?;
+        let sizes = match is_sized {
+            true => SizeState::Settled,
+            false => SizeState::Provisional,
         };
-        put_on
+        Ok(Self {
+            choices,
+            outfit,
+            sizes,
+            notes,
+            clock: FrameClock::default(),
+        })
     }
-}
 
-/// Watch over an outfit from step to step.
-#[derive(Clone, Debug)]
-pub(super) struct WearWatch {
-    reference: WornReference,
-    /// Mask of the part of each body vertex, shape `[body vertices]`.
-    masks: Vec<u8>,
-    state: WearState,
-}
-
-impl WearWatch {
-    /// Watch over an outfit that has just been put on a body with these part `masks`.
-    pub(super) fn new(model: &Model, state: &State, masks: Vec<u8>) -> Self {
-        Self {
-            reference: WornReference::new(model, state),
-            masks,
-            state: WearState::default(),
+    /// Follows the subject to a new exposure: carries garments that were just put on to its pose, and compares the sizes
+    /// once that of the subject `is_sized`. True when they were compared now.
+    ///
+    /// # Errors
+    /// A body that cannot be measured, of another size or with a vertex that is not finite.
+    pub fn follow(&mut self, subject: &Subject<'_>, is_sized: bool) -> Result<bool, MirrorError> {
+        self.outfit.carry_to(subject)?;
+        let is_due = is_sized && self.sizes == SizeState::Provisional;
+        if is_due {
+            let sized = sized(&self.choices, &measure(subject.template, subject.rest)?)?;
+            self.sizes = match self.outfit.is_in(&sized) {
+                true => SizeState::Settled,
+                false => SizeState::Misfit,
+            };
+            self.notes = notes(&sized);
         }
+        Ok(is_due)
     }
 
-    /// Positions of each garment as skin carries it from where it was put on to `body` (world, metres).
+    /// Steps the garments to the posed body (world, metres) of an exposure at `time_ns`.
     ///
     /// # Errors
     /// A body of another size or with a vertex that is not finite.
-    pub(super) fn skinned(&self, model: &Model, body: &[P3]) -> Result<Vec<Vec<P3>>, ClothError> {
-        self.reference.skinned(model, body)
+    pub fn step(&mut self, body: &[P3], time_ns: u64) -> Result<WearStep, ClothError> {
+        let gap = self.clock.gap(time_ns);
+        let report = self.outfit.step(body, time_step(gap))?;
+        Ok(WearStep { report, gap })
     }
 
-    /// True once putting it on again doesn't help: it was put on in a pose that the body never had.
-    pub(super) fn is_past_mending(&self) -> bool {
-        self.state.vain >= MOST_VAIN
+    /// The garments as they are put on, with their state.
+    pub fn outfit(&self) -> &DressedOutfit {
+        &self.outfit
     }
 
-    /// True when a part of the body moves from `before` to `now` (metres) in `dt` seconds as no limb can.
-    pub(super) fn has_jumped(&self, before: &[P3], now: &[P3], dt: f64) -> bool {
-        let most = JUMP.max((JUMP_SPEED * dt) as f32);
-        let moved = |part: BodyPart| {
-            let vertices = self.masks.iter().zip(before).zip(now);
-            let of = vertices.filter(|((mask, _), _)| **mask == part.mask());
-            let distances = of.map(|((_, a), b)| (b - a).norm());
-            let (sum, count) = distances.fold((0.0f32, 0.0f32), |(s, n), d| (s + d, n + 1.0));
-            sum > most * count
-        };
-        BodyPart::ALL.into_iter().any(moved)
+    /// Worn sizes against those of the body.
+    pub fn sizes(&self) -> SizeState {
+        self.sizes
     }
 
-    /// Judges a step of an outfit on a body that may have `jumped`, and puts it on again where it is past mending.
-    pub(super) fn judge(
-        &mut self,
-        model: &Model,
-        state: &mut State,
-        report: &StepReport,
-        jumped: bool,
-    ) {
-        let is_torn = report.p99_strain > MOST_STRAIN
-            || self.reference.limb_offset(model, state) > MOST_OFFSET;
-        let fit = match WornReference::lost_sleeve_rings(model, state) {
-            _ if is_torn => Fit::Torn,
-            0 => Fit::Worn,
-            _ => Fit::SleeveOff,
-        };
-        if self.state.advance(fit, jumped) {
-            self.reference.put_on(model, state);
-        }
+    /// Remarks about sizes and meshes.
+    pub fn notes(&self) -> &[String] {
+        &self.notes
     }
+}
+
+/// Garments in the sizes of a body.
+fn sized(choices: &[Choice], body: &Measurements) -> Result<Vec<SizedGarment>, MirrorError> {
+    let sized = choices.iter().map(|c| c.sized(body));
+    Ok(sized.collect::<Result<_, _>>()?)
+}
+
+/// Remarks of all garments.
+fn notes(sized: &[SizedGarment]) -> Vec<String> {
+    sized.iter().flat_map(|g| g.notes.iter().cloned()).collect()
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    /// Takes `steps` of one fit; the number of times that the outfit is put on again.
-    fn run(state: &mut WearState, steps: u32, fit: Fit) -> u32 {
-        let put_on = (0..steps).map(|_| u32::from(state.advance(fit, false)));
-        put_on.sum()
-    }
+    use tryon_body::{BodyShape, Pose, embedded};
+    use tryon_geometry::math::Rigid;
 
     #[test]
-    fn a_sleeve_put_back_is_left_to_cloth_once_and_put_on_again_when_it_stays_off() {
-        let mut state = WearState::default();
-        assert_eq!(run(&mut state, PATIENCE - 1, Fit::SleeveOff), 0);
-        run(&mut state, 1, Fit::Worn);
-        assert_eq!(state, WearState::default());
+    fn provisional_sizes_are_compared_once_when_the_body_has_settled() {
+        let template = embedded::template();
+        let pose = Pose::rest(template.skeleton(), Rigid::identity());
+        let small = template.personalise(&BodyShape::default());
+        let large = template.personalise(&BodyShape {
+            coefficients: vec![0.0, 2.5],
+            ..BodyShape::default()
+        });
+        let of = |rest| Subject {
+            template: &template,
+            rest,
+            pose: &pose,
+            world_from_camera: Rigid::identity(),
+        };
+        let tank = || vec![Choice::library("tank", None).expect("known")];
+        let put_on =
+            |is_sized| Wear::put_on(tank(), &of(&small), is_sized, PutOn::default()).expect("worn");
 
-        assert_eq!(run(&mut state, PATIENCE, Fit::SleeveOff), 1);
-        assert_eq!(run(&mut state, SETTLING - 1, Fit::Worn), 0);
-        assert_eq!(run(&mut state, 1, Fit::SleeveOff), 1, "it had not settled");
-        run(&mut state, SETTLING, Fit::Worn);
-        assert_eq!(state, WearState::default());
-    }
+        let mut settled = put_on(true);
+        assert!(!settled.follow(&of(&large), true).expect("followed"));
+        assert_eq!(settled.sizes(), SizeState::Settled);
 
-    #[test]
-    fn a_torn_garment_is_put_on_again_at_once() {
-        let mut state = WearState::default();
-        assert_eq!(run(&mut state, 3, Fit::Torn), 3);
-        assert_eq!((state.settling, state.vain), (Some(0), 3));
-        run(&mut state, SETTLING, Fit::Worn);
-        assert_eq!(state, WearState::default());
-    }
-
-    #[test]
-    fn each_jump_puts_the_outfit_on_again_and_is_no_fault() {
-        let mut state = WearState::default();
-        assert!((0..50).all(|_| state.advance(Fit::Worn, true)));
-        assert_eq!(state.vain, 0);
-        run(&mut state, SETTLING, Fit::Worn);
-        assert_eq!(state, WearState::default());
-    }
-
-    #[test]
-    fn an_outfit_that_never_fits_is_past_mending_until_it_fits() {
-        let mut state = WearState::default();
-        assert_eq!(run(&mut state, MOST_VAIN, Fit::Torn), MOST_VAIN);
-        assert_eq!(state.vain, MOST_VAIN);
-        run(&mut state, SETTLING, Fit::Worn);
-        assert_eq!(state, WearState::default());
+        for (rest, after) in [(&small, SizeState::Settled), (&large, SizeState::Misfit)] {
+            let mut wear = put_on(false);
+            assert!(!wear.follow(&of(rest), false).expect("followed"));
+            assert_eq!(wear.sizes(), SizeState::Provisional);
+            assert!(wear.follow(&of(rest), true).expect("followed"));
+            assert!(!wear.follow(&of(rest), true).expect("followed"));
+            assert_eq!(wear.sizes(), after);
+            assert_eq!(wear.notes().len(), 1);
+        }
     }
 }

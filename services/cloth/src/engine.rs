@@ -9,7 +9,7 @@ use tryon::cloth::StepReport;
 use tryon::dressing::{self, FitProbe, Suggestion};
 use tryon::geometry::math::{Camera, Rigid, World};
 use tryon::mirror::{
-    Choice, DressedOutfit, FrameClock, LongGap, PosedBody, PutOn, SizedGarment, Subject,
+    Choice, DressedOutfit, MirrorError, PosedBody, PutOn, SizeState, SizedGarment, Subject, Wear,
 };
 use tryon_kit::frames::stage;
 use tryon_kit::telemetry::record_skipped;
@@ -82,15 +82,9 @@ impl Body {
 
 /// An outfit on a tracked body.
 pub(crate) struct Worn {
-    outfit: DressedOutfit,
-    choices: Vec<Choice>,
-    /// Their sizes are those of a body whose size still changed.
-    is_provisional: bool,
-    /// The size of the body has settled and asks for other sizes.
-    is_misfit: bool,
+    wear: Wear,
     template: Arc<Template>,
     body: PosedBody,
-    clock: FrameClock,
     /// Garments are sewn from coarser cloth.
     is_coarse: bool,
     garments: Arc<[Arc<WornGarment>]>,
@@ -158,36 +152,33 @@ pub(crate) fn dress(
         any_size: true,
         is_coarse,
     };
-    let sized = sized(&chosen, &measures)?;
-    let outfit = DressedOutfit::put_on(&body.subject(&rest), sized, how);
-    let outfit = outfit.map_err(|e| e.to_string())?;
+    let wear = Wear::put_on(chosen, &body.subject(&rest), body.is_sized(), how).map_err(reason)?;
+    let outfit = wear.outfit();
     let garments = (0..outfit.model.outfit.garments.len())
-        .map(|k| worn_garment(&outfit, k, choices))
+        .map(|k| worn_garment(outfit, k, choices))
         .collect::<Result<Vec<_>, _>>()?;
     metrics::histogram!("tryon_stage_ms", "stage" => "cloth.dress")
         .record(start.elapsed().as_secs_f64() * 1e3);
     Ok(Worn {
         garments: garments.into(),
-        ease: ease(&outfit, &measures),
+        ease: ease(outfit, &measures),
         fit: FitProbe::new(&body.template, &outfit.model).map_err(|e| e.to_string())?,
         fit_age: FIT_INTERVAL,
         is_resized: false,
         measured: Vec::new(),
         is_coarse,
-        outfit,
-        choices: chosen,
-        is_provisional: !body.is_sized(),
-        is_misfit: false,
+        wear,
         template: body.template.clone(),
         body: PosedBody::new(body.shape.clone(), rest),
-        clock: FrameClock::at(body.time_ns()),
     })
 }
 
-/// Garments in the sizes of a body.
-fn sized(choices: &[Choice], measures: &Measurements) -> Result<Vec<SizedGarment>, String> {
-    let sized = choices.iter().map(|c| c.sized(measures));
-    sized.collect::<Result<_, _>>().map_err(|e| e.to_string())
+/// Reason of a failure, as a client reads it.
+fn reason(e: MirrorError) -> String {
+    match e {
+        MirrorError::Dress(e) => e.to_string(),
+        e => e.to_string(),
+    }
 }
 
 /// Garment `k` of the outfit as keyframes describe it.
@@ -230,9 +221,12 @@ impl Worn {
         self.is_resized |= self.body.pose(&body.template, &body.shape, &body.pose);
         let posed = stage("cloth.body", start);
         let subject = body.subject(self.body.rest());
-        self.outfit.carry_to(&subject).map_err(|e| e.to_string())?;
-        if self.is_provisional && body.is_sized() {
-            self.settle_sizes()?;
+        if self
+            .wear
+            .follow(&subject, body.is_sized())
+            .map_err(reason)?
+        {
+            self.fit_age = FIT_INTERVAL;
         }
         let mut update = if is_simulated {
             self.step(body)?
@@ -253,7 +247,7 @@ impl Worn {
     /// Garments as skin carries them; their fit is kept.
     fn skin(&mut self, body: &Body) -> Result<Update, String> {
         let begun = Instant::now();
-        let positions = self.outfit.skinned(self.body.vertices());
+        let positions = self.wear.outfit().skinned(self.body.vertices());
         let mut frame = frame_of(body);
         frame.stages.push(stage("cloth.skin", begun));
         Ok(Update {
@@ -264,16 +258,12 @@ impl Worn {
 
     fn step(&mut self, body: &Body) -> Result<Update, String> {
         let begun = Instant::now();
-        let gap = self.clock.gap(body.time_ns());
-        let dt = LongGap::Clamped.time_step(gap);
-        let report = self
-            .outfit
-            .step(self.body.vertices(), dt)
-            .map_err(|e| e.to_string())?;
-        let mut update = self.update(body, report);
+        let step =
+            (self.wear.step(self.body.vertices(), body.time_ns())).map_err(|e| e.to_string())?;
+        let mut update = self.update(body, step.report);
         update.frame.stages.push(stage("cloth.step", begun));
 
-        self.fit_age += gap;
+        self.fit_age += step.gap;
         update.frame.fit = std::mem::take(&mut self.measured);
         Ok(update)
     }
@@ -285,32 +275,24 @@ impl Worn {
 
     /// The size of the body has settled and asks for other sizes than the worn ones.
     pub(crate) fn is_misfit(&self) -> bool {
-        self.is_misfit
-    }
-
-    /// Compares the sizes with those of the body, whose size has settled; the fit is measured anew.
-    fn settle_sizes(&mut self) -> Result<(), String> {
-        let measures = measure(&self.template, self.body.rest()).map_err(|e| e.to_string())?;
-        self.is_misfit = !self.outfit.is_in(&sized(&self.choices, &measures)?);
-        (self.is_provisional, self.fit_age) = (false, FIT_INTERVAL);
-        Ok(())
+        self.wear.sizes() == SizeState::Misfit
     }
 
     /// True once it must be dressed anew.
     pub(crate) fn is_past_mending(&self) -> bool {
-        self.outfit.is_past_mending()
+        self.wear.outfit().is_past_mending()
     }
 
     /// Sizes of the choices, once those of the body have settled and are worn; empty for garments made to measure.
     pub(crate) fn settled_sizes(&self) -> Option<Vec<String>> {
         let size = |g: &SizedGarment| g.size().map_or_else(String::new, |s| s.to_string());
-        let is_settled = !self.is_provisional && !self.is_misfit;
-        is_settled.then(|| self.outfit.worn().iter().map(size).collect())
+        let is_settled = self.wear.sizes() == SizeState::Settled;
+        is_settled.then(|| self.wear.outfit().worn().iter().map(size).collect())
     }
 
     /// The outfit after the last step, and the template of its body.
     pub(crate) fn outfit(&self) -> (&DressedOutfit, &Arc<Template>) {
-        (&self.outfit, &self.template)
+        (self.wear.outfit(), &self.template)
     }
 
     /// Immutable part of every garment, for keyframes.
@@ -329,16 +311,16 @@ impl Worn {
         self.fit_age = 0.0;
         if std::mem::take(&mut self.is_resized) {
             let measures = measure(&self.template, self.body.rest()).map_err(|e| e.to_string())?;
-            self.ease = ease(&self.outfit, &measures);
+            self.ease = ease(self.wear.outfit(), &measures);
         }
-        let outfit = &self.outfit;
+        let outfit = self.wear.outfit();
         let maps = self
             .fit
             .measure(&outfit.model, &outfit.state, self.body.vertices())
             .map_err(|e| e.to_string())?;
         self.measured = (self.garments.iter().zip(&maps).zip(&self.ease))
             .map(|((g, map), ease)| v1::GarmentFit {
-                provisional: self.is_provisional,
+                provisional: self.wear.sizes() == SizeState::Provisional,
                 ..fit_to_wire(&g.garment, &g.size, map, ease.as_ref())
             })
             .collect();
@@ -357,7 +339,7 @@ impl Worn {
         );
         let mut frame = frame_of(body);
         frame.detail = report.kept_last_good.unwrap_or_default();
-        let garments = self.outfit.state.garments.iter();
+        let garments = self.wear.outfit().state.garments.iter();
         Update {
             frame,
             positions: Arc::new(garments.map(|g| g.positions.clone()).collect()),

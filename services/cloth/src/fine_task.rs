@@ -11,7 +11,7 @@ use tryon::body::Template;
 use tryon::cloth::fine::{DrapeReport, FrameTargets};
 use tryon::geometry::math::V3d;
 use tryon::geometry::par::Par;
-use tryon::mirror::{DressedOutfit, FrameClock, LongGap, MirrorError, OfflineOutfit};
+use tryon::mirror::{DressedOutfit, FrameClock, MirrorError, OfflineOutfit, time_step};
 use tryon_proto::convert::WireError;
 use tryon_proto::convert::garment::{WornGarment, topology_to_wire};
 use tryon_proto::v1::{
@@ -217,7 +217,7 @@ impl FineTask {
         drop(checkpoint);
         let mut clock = FrameClock::at(last.captured_ns);
         while let Some(body) = recording.blocking_recv() {
-            let dt = LongGap::Nominal.time_step(clock.gap(body.exposure.capture_time_ns));
+            let dt = time_step(clock.gap(body.exposure.capture_time_ns));
             let obstacle: Vec<V3d> = body.vertices.iter().map(|p| p.coords.cast()).collect();
             let targets = FrameTargets {
                 pins: &self.outfit.pins(&body.vertices),

@@ -12,7 +12,7 @@ use tryon::formats::image::{encode_jpeg, encode_png_rgb};
 use tryon::geometry::camera::ColorImage;
 use tryon::geometry::math::{Camera, Rigid, World};
 use tryon::mirror::{
-    CameraGarments, DrawnBody, DrawnSurface, FollowedBody, FrameClock, LongGap, PosedBody,
+    CameraGarments, DrawnBody, DrawnSurface, FollowedBody, FrameClock, PosedBody, time_step,
 };
 use tryon::view::{
     Appearance, Config, Framing, ImagePyramid, Input, Model, OffPerson, Print, RenderReport, State,
@@ -156,7 +156,7 @@ impl Engine {
         let body = self.body.as_mut().filter(|_| has_body);
         let body = body.map(|(drawn, followed)| {
             drawn.view(if is_dressed {
-                followed.follow(posed, LongGap::Clamped.time_step(gap))
+                followed.follow(posed, time_step(gap))
             } else {
                 posed
             })

@@ -22,8 +22,8 @@ use tryon::geometry::camera::ColorImage;
 use tryon::geometry::math::{P3, V3d};
 use tryon::geometry::par::{Par, with_threads};
 use tryon::mirror::{
-    DressedOutfit, FrameClock, LongGap, MirrorError, OfflineDrapeReport, OfflineOutfit,
-    OutfitPainter,
+    DressedOutfit, FrameClock, MirrorError, OfflineDrapeReport, OfflineOutfit, OutfitPainter,
+    time_step,
 };
 
 /// Nominal time between frames of the animation (s).
@@ -330,7 +330,7 @@ impl<'a> Animation<'a> {
         let (mut done, mut is_whole) = (0, true);
         while let Some(frame) = preview.next()? {
             done += 1;
-            let dt = LongGap::Nominal.time_step(clock.gap(frame.frame.time_ns));
+            let dt = time_step(clock.gap(frame.frame.time_ns));
             if done <= self.resumed {
                 self.is_lost = !frame.seen.is_dressed;
                 bar.inc(1);

@@ -7,8 +7,8 @@
 use super::field::Field;
 use super::figure::{Figure, Joints};
 use super::{carve, rig, statistics as stat};
-use tryon_body::measure::{Measurements, measure};
 use tryon_body::embedded::DIRECTIONS;
+use tryon_body::measure::{Measurements, measure};
 use tryon_body::parts::BodySegment;
 use tryon_body::{BodyError, BodyShape, ShapeSpace, Skeleton, SkinWeights, Template};
 use tryon_geometry::math::{P3d, V3d};

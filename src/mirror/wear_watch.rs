@@ -1,0 +1,177 @@
+//! Fit of a worn outfit from step to step, and its return to how it was put on.
+
+use tryon_body::parts::BodyPart;
+use tryon_cloth::{ClothError, Model, State, StepReport, WornReference};
+use tryon_geometry::math::P3;
+
+/// Stretch that one edge in a hundred exceeds in a garment that is caught or torn: dances reach 0.25 for a frame.
+const MOST_STRAIN: f64 = 0.25;
+/// Largest median distance of a limb's cloth from where skin would carry it, metres: dances reach 63 mm.
+const MOST_OFFSET: f32 = 0.08;
+/// Steps in a row with a sleeve off after which an outfit is put on again: cloth puts it back in the next one, or never.
+const PATIENCE: u32 = 2;
+/// Steps in which an outfit that was put on again settles: a sleeve that comes off then isn't left to cloth.
+pub(super) const SETTLING: u32 = 4;
+/// Unfit steps of an outfit that doesn't settle after which it must be dressed anew, which takes 0.3 to 0.7 s: one second.
+const MOST_VAIN: u32 = 30;
+/// Mean displacement of a body part that is a jump, metres, and its least speed, m/s: a fast arm moves by 0.2 m in 1/30 s.
+const JUMP: f32 = 0.25;
+/// See [`JUMP`].
+const JUMP_SPEED: f64 = 7.0;
+
+/// Fit of an outfit after one step.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Fit {
+    /// Worn as it was put on.
+    Worn,
+    /// Part of a sleeve is off its arm: cloth puts it back in the next step.
+    SleeveOff,
+    /// Past what cloth can be, or off its limbs.
+    Torn,
+}
+
+/// Fitness of an outfit over time.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+struct WearState {
+    /// Unfit steps in a row.
+    unfit: u32,
+    /// Steps since the outfit was put on again; `None` once it has settled.
+    settling: Option<u32>,
+    /// Unfit steps before it settled.
+    vain: u32,
+}
+
+impl WearState {
+    /// Takes the result of a step; true when the outfit must be put on again.
+    fn advance(&mut self, fit: Fit, jumped: bool) -> bool {
+        let is_unfit = fit != Fit::Worn;
+        self.unfit = if is_unfit { self.unfit + 1 } else { 0 };
+        let patience = self.settling.map_or(PATIENCE, |_| 1);
+        let put_on = jumped || fit == Fit::Torn || self.unfit >= patience;
+        let settled = self.settling.map(|n| n + 1).filter(|n| *n < SETTLING);
+        self.settling = if put_on { Some(0) } else { settled };
+        self.vain = match self.settling {
+            Some(_) => self.vain + u32::from(is_unfit),
+            None => 0,
+        };
+        put_on
+    }
+}
+
+/// Watch over an outfit from step to step.
+#[derive(Clone, Debug)]
+pub(super) struct WearWatch {
+    reference: WornReference,
+    /// Mask of the part of each body vertex, shape `[body vertices]`.
+    masks: Vec<u8>,
+    state: WearState,
+}
+
+impl WearWatch {
+    /// Watch over an outfit that has just been put on a body with these part `masks`.
+    pub(super) fn new(model: &Model, state: &State, masks: Vec<u8>) -> Self {
+        Self {
+            reference: WornReference::new(model, state),
+            masks,
+            state: WearState::default(),
+        }
+    }
+
+    /// Positions of each garment as skin carries it from where it was put on to `body` (world, metres).
+    ///
+    /// # Errors
+    /// A body of another size or with a vertex that is not finite.
+    pub(super) fn skinned(&self, model: &Model, body: &[P3]) -> Result<Vec<Vec<P3>>, ClothError> {
+        self.reference.skinned(model, body)
+    }
+
+    /// True once putting it on again doesn't help: it was put on in a pose that the body never had.
+    pub(super) fn is_past_mending(&self) -> bool {
+        self.state.vain >= MOST_VAIN
+    }
+
+    /// True when a part of the body moves from `before` to `now` (metres) in `dt` seconds as no limb can.
+    pub(super) fn has_jumped(&self, before: &[P3], now: &[P3], dt: f64) -> bool {
+        let most = JUMP.max((JUMP_SPEED * dt) as f32);
+        let moved = |part: BodyPart| {
+            let vertices = self.masks.iter().zip(before).zip(now);
+            let of = vertices.filter(|((mask, _), _)| **mask == part.mask());
+            let distances = of.map(|((_, a), b)| (b - a).norm());
+            let (sum, count) = distances.fold((0.0f32, 0.0f32), |(s, n), d| (s + d, n + 1.0));
+            sum > most * count
+        };
+        BodyPart::ALL.into_iter().any(moved)
+    }
+
+    /// Judges a step of an outfit on a body that may have `jumped`, and puts it on again where it is past mending.
+    pub(super) fn judge(
+        &mut self,
+        model: &Model,
+        state: &mut State,
+        report: &StepReport,
+        jumped: bool,
+    ) {
+        let is_torn = report.p99_strain > MOST_STRAIN
+            || self.reference.limb_offset(model, state) > MOST_OFFSET;
+        let fit = match WornReference::lost_sleeve_rings(model, state) {
+            _ if is_torn => Fit::Torn,
+            0 => Fit::Worn,
+            _ => Fit::SleeveOff,
+        };
+        if self.state.advance(fit, jumped) {
+            self.reference.put_on(model, state);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Takes `steps` of one fit; the number of times that the outfit is put on again.
+    fn run(state: &mut WearState, steps: u32, fit: Fit) -> u32 {
+        let put_on = (0..steps).map(|_| u32::from(state.advance(fit, false)));
+        put_on.sum()
+    }
+
+    #[test]
+    fn a_sleeve_put_back_is_left_to_cloth_once_and_put_on_again_when_it_stays_off() {
+        let mut state = WearState::default();
+        assert_eq!(run(&mut state, PATIENCE - 1, Fit::SleeveOff), 0);
+        run(&mut state, 1, Fit::Worn);
+        assert_eq!(state, WearState::default());
+
+        assert_eq!(run(&mut state, PATIENCE, Fit::SleeveOff), 1);
+        assert_eq!(run(&mut state, SETTLING - 1, Fit::Worn), 0);
+        assert_eq!(run(&mut state, 1, Fit::SleeveOff), 1, "it had not settled");
+        run(&mut state, SETTLING, Fit::Worn);
+        assert_eq!(state, WearState::default());
+    }
+
+    #[test]
+    fn a_torn_garment_is_put_on_again_at_once() {
+        let mut state = WearState::default();
+        assert_eq!(run(&mut state, 3, Fit::Torn), 3);
+        assert_eq!((state.settling, state.vain), (Some(0), 3));
+        run(&mut state, SETTLING, Fit::Worn);
+        assert_eq!(state, WearState::default());
+    }
+
+    #[test]
+    fn each_jump_puts_the_outfit_on_again_and_is_no_fault() {
+        let mut state = WearState::default();
+        assert!((0..50).all(|_| state.advance(Fit::Worn, true)));
+        assert_eq!(state.vain, 0);
+        run(&mut state, SETTLING, Fit::Worn);
+        assert_eq!(state, WearState::default());
+    }
+
+    #[test]
+    fn an_outfit_that_never_fits_is_past_mending_until_it_fits() {
+        let mut state = WearState::default();
+        assert_eq!(run(&mut state, MOST_VAIN, Fit::Torn), MOST_VAIN);
+        assert_eq!(state.vain, MOST_VAIN);
+        run(&mut state, SETTLING, Fit::Worn);
+        assert_eq!(state, WearState::default());
+    }
+}
