@@ -1,6 +1,7 @@
 //! Rendering and encoding of one try-on's pictures.
 
 use crate::card::Card;
+use crate::encoding::Encoding;
 use crate::formats::Format;
 use crate::join_buffer::ReportedBody;
 use crate::off_person::NewestOffPerson;
@@ -20,15 +21,11 @@ use tryon::view::{
 };
 use tryon_kit::frames::{Exposure, stage};
 use tryon_kit::telemetry::record_skipped;
-use tryon_proto::convert::WireError;
 use tryon_proto::convert::body::pose_from_wire;
 use tryon_proto::convert::fit::tightness;
 use tryon_proto::convert::garment::{PlacedGarments, WornGarment, WornImage};
 use tryon_proto::convert::request::PictureFormat;
-use tryon_proto::v1::{ClothDetail, PictureCodec, StageTime};
-
-/// JPEG quality of single pictures.
-pub(crate) const PICTURE_QUALITY: u8 = 95;
+use tryon_proto::v1::{ClothDetail, StageTime};
 
 /// Garments that belong to one exposure.
 pub(crate) struct Placed {
@@ -38,36 +35,6 @@ pub(crate) struct Placed {
     /// Revision as this service counts.
     pub(crate) revision: u64,
     pub(crate) detail: ClothDetail,
-}
-
-/// Encoding of a picture.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub(crate) enum Encoding {
-    Jpeg(u8),
-    Png,
-}
-
-impl From<Encoding> for PictureCodec {
-    fn from(encoding: Encoding) -> Self {
-        match encoding {
-            Encoding::Jpeg(_) => Self::Jpeg,
-            Encoding::Png => Self::Png,
-        }
-    }
-}
-
-impl Encoding {
-    /// Encoding of single pictures.
-    ///
-    /// # Errors
-    /// Names the field when the codec is unknown.
-    pub(crate) fn of_picture(codec: i32, field: &str) -> Result<Self, WireError> {
-        match PictureCodec::try_from(codec) {
-            Ok(PictureCodec::Unspecified | PictureCodec::Png) => Ok(Self::Png),
-            Ok(PictureCodec::Jpeg) => Ok(Self::Jpeg(PICTURE_QUALITY)),
-            Err(_) => Err(WireError::new(field, "JPEG or PNG")),
-        }
-    }
 }
 
 /// Pictures to render of one exposure.

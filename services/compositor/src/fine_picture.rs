@@ -1,7 +1,8 @@
 //! Fine picture of a try-on: cloth drapes its garments on finer meshes, and the exposure of that pose is drawn with them.
 
 use crate::card::Card;
-use crate::engine::{Encoding, Engine, Job, Placed};
+use crate::encoding::Encoding;
+use crate::engine::{Engine, Job, Placed};
 use crate::join_buffer::JoinBuffer;
 use crate::off_person;
 use crate::try_on::{Command, Handle};

@@ -3,7 +3,7 @@
 //! The most wanted format is always drawn, the older of equals. Of the others, those that fit before the next exposure cost nobody anything;
 //! one that does not is paid from a small share of the time, longest unserved first.
 
-use crate::engine::Encoding;
+use crate::encoding::Encoding;
 use std::collections::BTreeMap;
 use tokio::time::{Duration, Instant};
 

@@ -21,6 +21,7 @@
 mod admission;
 mod card;
 mod empty_scene;
+mod encoding;
 mod engine;
 mod fine_picture;
 mod formats;

@@ -1,7 +1,8 @@
 //! Two sessions side by side whose frames and garments are painted with who they belong to: no picture shows another's.
 
 use crate::card::Card;
-use crate::engine::{Encoded, Encoding, Engine, Job, Placed};
+use crate::encoding::Encoding;
+use crate::engine::{Encoded, Engine, Job, Placed};
 use crate::join_buffer::JoinBuffer;
 use std::sync::Arc;
 use tryon::formats::image::decode_jpeg;

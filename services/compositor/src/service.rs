@@ -2,7 +2,7 @@
 
 use crate::admission::Admission;
 use crate::card::Card;
-use crate::engine::{Encoding, PICTURE_QUALITY};
+use crate::encoding::{Encoding, PICTURE_QUALITY};
 use crate::fine_picture::{self, FinePicture};
 use crate::photos::{self, Photos};
 use crate::try_on::{self, Command, Handle, Setup};

@@ -1,7 +1,7 @@
 //! Access to a try-on's task and the dependencies of that task.
 
 use crate::card::Card;
-use crate::engine::Encoding;
+use crate::encoding::Encoding;
 use crate::join_buffer::JoinBuffer;
 use crate::photos::Photos;
 use crate::upstream::Wanted;
