@@ -157,9 +157,8 @@ pub(crate) fn assemble(
     let centre = scratch.centre();
     let mut equations = std::mem::take(&mut scratch.equations);
     equations.reset(model.parents.len());
-    let single = model.config.single_precision;
     let sums = for_each_point(context, scratch, sigma, point_to_point, |term| {
-        equations.add_point(term, &centre, single);
+        equations.add_point(term, &centre);
     });
     let skeleton = model.template.skeleton();
     linearise(skeleton, &scratch.bones, pose, &centre, &mut scratch.dofs);

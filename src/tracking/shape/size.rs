@@ -30,6 +30,10 @@ pub struct SizeEstimate {
     pub(crate) is_settled: bool,
 }
 
+/// Prior of a coefficient (one standard deviation = 1), per point, m²: larger keeps the mean shape against readings.
+const SHAPE_PRIOR: f64 = 5e-7;
+/// Standard deviation of a bone's scale: with a shape space, which explains most of it, and without one.
+const SCALE_DEVIATIONS: [f64; 2] = [0.05, 0.15];
 /// Weight λₛ of eq. 23, per point, m²: bones tied by symmetry differ by a tenth of what single ones do.
 const TIE: f64 = 5e-3;
 /// Largest coefficient, standard deviations: a child is eight below the mean of adults.
@@ -46,7 +50,7 @@ const START: (f32, f64) = (0.15, 0.08);
 const LATER: (f32, f64) = (0.08, 0.04);
 /// Frames with the longer pairs.
 const SEARCHING: u32 = 20;
-/// Point-to-point weight: a fifth of the pose's, as sizes must slide along limbs.
+/// Point-to-point weight: two fifths of the pose's, as sizes must slide along limbs.
 const POINT_TO_POINT: f64 = 0.02;
 /// Frames between two comparisons of the girths: half a second at 30 Hz.
 const SETTLING_FRAMES: u32 = 15;
@@ -168,13 +172,12 @@ fn store(model: &TrackerModel, x: &DVector<f64>, shape: &mut BodyShape) {
 /// Data and prior: (Λ + P) x = η, with eq. 23 in P.
 fn solve(model: &TrackerModel, mut h: DMatrix<f64>, g: DVector<f64>) -> Option<DVector<f64>> {
     let has_space = model.directions.iter().any(|d| d.bone.is_none());
-    let deviation = model.config.scale_deviation[usize::from(!has_space)];
-    let prior = model.config.shape_prior;
+    let deviation = SCALE_DEVIATIONS[usize::from(!has_space)];
     for (d, direction) in model.directions.iter().enumerate() {
         h[(d, d)] += if direction.bone.is_some() {
-            prior / (deviation * deviation)
+            SHAPE_PRIOR / (deviation * deviation)
         } else {
-            prior
+            SHAPE_PRIOR
         };
     }
     for &(a, b, weight) in &model.tied {
