@@ -219,22 +219,17 @@ fn chain() -> (Vec<Option<usize>>, Vec<Dof>, Vec<PointTerm>) {
 fn equations(c: &mut Criterion) {
     let (parents, dofs, residuals) = chain();
     let mut sums = NormalEquations::default();
-    let fill = |sums: &mut NormalEquations, single: bool, list: &[PointTerm]| {
+    let fill = |sums: &mut NormalEquations, list: &[PointTerm]| {
         sums.reset(parents.len());
         let centre = Vector3::zeros();
-        list.iter().for_each(|t| sums.add_point(t, &centre, single));
+        list.iter().for_each(|t| sums.add_point(t, &centre));
         sums.assemble(&parents, &dofs);
     };
-    c.bench_function("equations/1,600 residuals, 75 unknowns, f64", |b| {
-        b.iter(|| fill(&mut sums, false, &residuals))
+    c.bench_function("equations/1,600 residuals, 75 unknowns", |b| {
+        b.iter(|| fill(&mut sums, &residuals))
     });
-    c.bench_function("equations/the same, f32", |b| {
-        b.iter(|| fill(&mut sums, true, &residuals))
-    });
-    c.bench_function("equations/no residual", |b| {
-        b.iter(|| fill(&mut sums, false, &[]))
-    });
-    fill(&mut sums, false, &residuals);
+    c.bench_function("equations/no residual", |b| b.iter(|| fill(&mut sums, &[])));
+    fill(&mut sums, &residuals);
     let damping = vec![1e-1; dofs.len()];
     c.bench_function("solve/75 unknowns", |b| {
         b.iter(|| sums.solve_damped(&damping))

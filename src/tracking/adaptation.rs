@@ -2,9 +2,12 @@
 //!
 //! Apart from the pose, so that a service publishes the pose first: the displacements are for the next frame.
 
-use super::pose_fit::{FitContext, pair};
-use super::{TrackerModel, TrackerState, Workspace, surface};
+use super::state::TrackerState;
+use super::workspace::Workspace;
+use crate::fit::{FitContext, pair};
+use crate::model::TrackerModel;
 use crate::registration::Observation;
+use crate::shape::fit_displacements;
 
 /// Longest pair when the body is drawn for displacements, metres (paper, section 3.3).
 const DISPLACEMENT_DISTANCE: f32 = 0.05;
@@ -39,7 +42,7 @@ pub fn adapt_surface(
     };
     let scratch = &mut workspace.fit;
     pair(&context, &state.pose, DISPLACEMENT_DISTANCE, 0.0, scratch);
-    let (updated, change) = surface::fit(
+    let (updated, change) = fit_displacements(
         &context,
         scratch,
         &mut state.shape.displacements,

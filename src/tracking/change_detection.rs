@@ -1,6 +1,6 @@
 //! Change detection: reuses the last report while the depth image differs from a reference only by sensor noise.
 
-use super::{StepReport, TrackingStagesMs};
+use super::report::{StepReport, TrackingStagesMs};
 use serde::{Deserialize, Serialize};
 use tryon_geometry::camera::DepthImage;
 use tryon_geometry::spatial::OrganisedCloud;
@@ -165,7 +165,8 @@ fn samples(image: &DepthImage, step: u32, columns: u32, block: u32, mut f: impl 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{Skipped, Status};
+    use crate::report::Skipped;
+    use crate::status::Status;
     use rand::{Rng, SeedableRng};
 
     const WIDTH: u32 = 160;

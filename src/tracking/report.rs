@@ -1,8 +1,7 @@
 //! Report and error of a step.
 
-use super::agreement::Agreement;
-use super::confidence::JointConfidence;
 use super::status::Status;
+use crate::assess::{Agreement, JointConfidence};
 use serde::{Deserialize, Serialize};
 use std::time::Instant;
 

@@ -1,8 +1,11 @@
 //! Segmentation stage of a step: scene planes, the subject's cells and their outline.
 
-use super::person_evidence::Verdict;
-use super::pose_fit::FitContext;
-use super::{Status, TrackerModel, TrackerState, Workspace};
+use super::state::TrackerState;
+use super::status::Status;
+use super::workspace::Workspace;
+use crate::assess::Verdict;
+use crate::fit::FitContext;
+use crate::model::TrackerModel;
 use crate::registration::Observation;
 use crate::segment::{PersonChoice, PersonPrior, PersonSearch, contour, find_person, find_planes};
 use tryon_geometry::camera::RgbdFrame;

@@ -1,16 +1,14 @@
 //! State of a tracker from frame to frame.
 
 use super::change_detection::DepthReference;
-use super::person_evidence::{PersonBelief, Verdict};
-use super::probation::Probation;
-use super::repair::RepairTimer;
-use super::seat::Seat;
-use super::size::SizeEstimate;
-use super::standing::FootMemory;
 use super::status::{LostReason, Status};
-use super::surface::SurfaceStatistics;
-use super::{TrackerConfig, TrackerModel};
+use crate::assess::{PersonBelief, Seat, Verdict};
+use crate::fit::{FootMemory, RecentPoses};
+use crate::model::{TrackerConfig, TrackerModel};
+use crate::recover::RepairTimer;
 use crate::segment::{Refusals, ScenePlanes};
+use crate::shape::{Probation, SizeEstimate, SurfaceStatistics};
+use crate::start::ASSUMED_HEIGHT;
 use nalgebra::{UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
 use tryon_body::{BodyShape, Pose};
@@ -87,8 +85,6 @@ pub struct TrackerState {
     pub(super) surface_due: [u32; 2],
 }
 
-/// Height of a camera whose floor is unknown, metres: the usual mount of a kiosk.
-pub(super) const ASSUMED_HEIGHT: f64 = 1.2;
 /// Root of the rest pose before any was found, camera frame, metres: standing at 2 m.
 const START: Vector3<f64> = Vector3::new(0.0, 0.9, 2.0);
 
@@ -182,5 +178,26 @@ impl TrackerState {
     /// True once size and shape no longer change.
     pub(super) fn calibrated(&self, config: &TrackerConfig) -> bool {
         !config.adapt_size || self.size.frames >= config.calibration_frames
+    }
+    /// Status of a live pose: `Sitting` for who sits; `Calibrating` until the size has settled, then `Tracking`.
+    pub(super) fn live_status(&self, config: &TrackerConfig) -> Status {
+        if self.seat.is_taken {
+            Status::Sitting
+        } else if self.is_sized(config) {
+            Status::Tracking
+        } else {
+            Status::Calibrating
+        }
+    }
+    /// Poses from which the next one is predicted.
+    pub(super) fn recent_poses(&self, config: &TrackerConfig) -> RecentPoses<'_> {
+        RecentPoses {
+            last: &self.pose,
+            before: self.before.as_ref(),
+            time_ns: self.time_ns,
+            interval_ns: self.interval_ns,
+            quality: self.quality,
+            is_calibrated: self.calibrated(config),
+        }
     }
 }

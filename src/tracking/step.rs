@@ -2,16 +2,18 @@
 
 use super::adaptation::adapt_surface;
 use super::change_detection::DepthReference;
-use super::extrapolation::motion;
-use super::gravity::rolled_camera;
-use super::person_evidence::Verdict;
-use super::prediction::AT_REST;
-use super::report::Stopwatch;
+use super::report::{StepError, StepReport, Stopwatch};
 use super::segmentation::{LEAST_CELLS, segment};
+use super::state::TrackerState;
+use super::status::{LostReason, Status};
 use super::subject::{StepLog, SubjectFrame};
-use super::{LostReason, Status, StepError, StepReport, TrackerModel, TrackerState, Workspace};
+use super::workspace::Workspace;
+use crate::assess::Verdict;
+use crate::fit::{AT_REST, motion};
+use crate::model::TrackerModel;
 use crate::registration::Observation;
 use crate::segment::{CandidateBox, PersonSearch};
+use crate::start::rolled_camera;
 use nalgebra::Vector3;
 use tryon_geometry::camera::{DepthImage, RgbdFrame};
 use tryon_geometry::spatial::OrganisedCloud;

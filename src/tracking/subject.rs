@@ -1,32 +1,25 @@
 //! One subject in view (Algorithm 1): find or predict → fit → recover → calibrate → filter → commit.
 
-use super::agreement::Agreement;
-use super::body_proposals::{BodyProposals, person_cells};
-use super::calibration::{SizeCalibration, live_status};
-use super::confidence::confidence;
-use super::hand_assignment::assign_hands;
-use super::hidden_limb::HiddenLimb;
-use super::initial_pose::{StartPrior, initial_pose, outline};
-use super::person_evidence::{PersonBelief, PersonEvidence, Verdict};
-use super::personal_body::PersonalBody;
-use super::pose_filter::filter_pose;
-use super::pose_fit::{
-    ANNEAL, FitContext, FitReport, FitTerms, START, START_TERMS, Schedule, TRACK, fit_pose,
+use super::report::{Skipped, StepReport, Stopwatch, TrackingStagesMs};
+use super::state::TrackerState;
+use super::status::{LostReason, Status};
+use super::workspace::Workspace;
+use crate::assess::{
+    Agreement, JointConfidence, PersonBelief, PersonEvidence, Seat, Verdict, confidence, sits,
 };
-use super::prediction::{Prediction, predict};
-use super::repair::Repair;
-use super::report::Stopwatch;
-use super::seat::{Seat, sits};
-use super::size::first_shapes;
-use super::standing::{FloorStance, FootMemory, HiddenKnees, floor_below, highest_hips};
-use super::{
-    JointConfidence, LostReason, SizeEstimate, Skipped, Status, StepReport, TrackerModel,
-    TrackerState, TrackingStagesMs, Workspace,
+use crate::fit::{
+    ANNEAL, FitContext, FitReport, FitTerms, FloorStance, FootMemory, HiddenKnees, Prediction,
+    START, START_TERMS, Schedule, TRACK, assign_hands, filter_pose, fit_pose, floor_below,
+    highest_hips, predict,
 };
+use crate::model::{PersonalBody, TrackerModel};
+use crate::recover::{HiddenLimb, Repair};
 use crate::registration::Observation;
 use crate::registration::residual::FloorPlane;
 use crate::segment::PersonSearch;
 use crate::segment::part_forest::PartScratch;
+use crate::shape::{SizeCalibration, SizeEstimate, first_shapes};
+use crate::start::{BodyProposals, StartPrior, initial_pose, outline, person_cells};
 use nalgebra::Vector3;
 use tryon_body::parts::BodyPart;
 use tryon_body::{BodyShape, BoneTransforms, Pose};
@@ -229,9 +222,10 @@ impl SubjectFrame<'_> {
             observation: &self.observation,
             body: &mut workspace.body,
             scratch: &mut workspace.fit,
+            up: self.up,
             cut_below: self.person.cut_below,
         };
-        calibration.adapt(state, pose, schedule, &self.up)
+        calibration.adapt(&mut state.size, &mut state.shape, pose, schedule)
     }
 
     /// Writes confidence and agreement of a fitted pose to the report.
@@ -417,7 +411,8 @@ impl SubjectFrame<'_> {
             ..FitTerms::tracking(config)
         };
         let context = self.context(&workspace.body);
-        predict(&context, state, self.frame.time_ns, &mut workspace.fit)
+        let recent = state.recent_poses(config);
+        predict(&context, &recent, self.frame.time_ns, &mut workspace.fit)
     }
 
     /// Fits the pose, with arms moved to their detected hands before and hidden knees bent after it.
@@ -467,7 +462,7 @@ impl SubjectFrame<'_> {
         let joints = &workspace.fit.bones.joints;
         let sits = sits(self.model, &self.up, joints, confidence);
         state.seat.update(sits);
-        state.status = live_status(self.model, state);
+        state.status = state.live_status(&self.model.config);
         state.highest_hips = highest_hips(self.model, &self.up, state.highest_hips, joints);
         let mut bones = BoneTransforms::default();
         state.pose.bones(skeleton, &workspace.body.rest, &mut bones);

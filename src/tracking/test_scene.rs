@@ -1,8 +1,8 @@
 //! The embedded body in its rest pose before a camera, and readings of it, for unit tests.
 
-use super::personal_body::PersonalBody;
-use super::pose_fit::FitContext;
-use super::{TrackerConfig, TrackerModel, TrackerState};
+use super::state::TrackerState;
+use crate::fit::FitContext;
+use crate::model::{PersonalBody, TrackerConfig, TrackerModel};
 use crate::registration::Observation;
 use crate::segment::{Contour, contour};
 use tryon_body::{BoneTransforms, Pose, RestBody, embedded, skin};

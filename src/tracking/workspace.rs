@@ -1,12 +1,12 @@
 //! Scratch and caches of a step. Dropping a workspace changes no result.
 
-use super::agreement::AgreementScratch;
-use super::personal_body::PersonalBody;
-use super::pose_fit::FitScratch;
-use super::surface::SurfaceScratch;
-use super::{TrackerModel, TrackerState};
+use super::state::TrackerState;
+use crate::assess::AgreementScratch;
+use crate::fit::FitScratch;
+use crate::model::{PersonalBody, TrackerModel};
 use crate::segment::part_forest::PartScratch;
 use crate::segment::{Contour, SegmentScratch};
+use crate::shape::SurfaceScratch;
 use tryon_body::{BodyShape, BoneTransforms, RestBody, skin};
 use tryon_geometry::math::P3;
 use tryon_geometry::par::Par;

@@ -314,34 +314,6 @@ fn straight_limbs_and_an_arm_along_the_view_are_steady() {
 }
 
 #[test]
-fn single_precision_sums_give_the_same_tracks() {
-    let (Some(template), Some(scene)) = (template(), recorded(80)) else {
-        return;
-    };
-    let run = |single_precision| {
-        let config = TrackerConfig {
-            single_precision,
-            ..TrackerConfig::default()
-        };
-        let mut tracks = Vec::new();
-        follow(&template, &config, &scene, |i, m, s, _, _| {
-            if i < 60 {
-                tracks.push((s.status, joints(m, s)));
-            }
-        });
-        tracks
-    };
-    let (double, single) = (run(false), run(true));
-    let mut off = Vec::new();
-    for (a, b) in double.iter().zip(&single) {
-        assert_eq!(a.0, b.0, "the same status");
-        off.extend(a.1.iter().zip(&b.1).map(|(p, q)| (p - q).norm() * 1e3));
-    }
-    eprintln!("f32 against f64 sums: {:.3} mm", mean(&off));
-    assert!(mean(&off) < 0.2, "{:.3} mm", mean(&off));
-}
-
-#[test]
 fn a_rough_start_settles() {
     use rand::{Rng, SeedableRng};
     let (template, scene) = own_body(Routine::Still, NoiseModel::KinectV1, 10);

@@ -1,45 +1,34 @@
 //! Metric of a point residual and the robust kernel of its weight.
 
-use nalgebra::{Matrix3, RealField, Vector3};
+use nalgebra::{Matrix3, Vector3};
 
 /// A quadratic form on residuals, `isotropic · I + directional · d dᵀ`.
 ///
 /// Point-to-plane is `d` = normal; distance from a viewing ray (eq. 10 of the paper, in metres instead of pixels) is
 /// `isotropic = 1, directional = −1, d` = ray.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Metric<T = f64> {
+pub struct Metric {
     /// Weight in all directions.
-    pub isotropic: T,
+    pub isotropic: f64,
     /// Extra weight along `direction`; not below `-isotropic`.
-    pub directional: T,
+    pub directional: f64,
     /// Unit vector.
-    pub direction: Vector3<T>,
+    pub direction: Vector3<f64>,
 }
 
-impl<T: RealField + Copy> Metric<T> {
+impl Metric {
     /// Squared length of a residual.
-    pub fn squared(&self, r: &Vector3<T>) -> T {
+    pub fn squared(&self, r: &Vector3<f64>) -> f64 {
         self.isotropic * r.norm_squared() + self.directional * self.direction.dot(r).powi(2)
     }
     /// Half the gradient of [`Metric::squared`].
-    pub fn apply(&self, r: &Vector3<T>) -> Vector3<T> {
+    pub fn apply(&self, r: &Vector3<f64>) -> Vector3<f64> {
         r * self.isotropic + self.direction * (self.directional * self.direction.dot(r))
     }
     /// The matrix of the form.
-    pub fn matrix(&self) -> Matrix3<T> {
+    pub fn matrix(&self) -> Matrix3<f64> {
         Matrix3::identity() * self.isotropic
             + self.direction * self.direction.transpose() * self.directional
-    }
-}
-
-impl Metric<f64> {
-    /// The same in single precision.
-    pub fn cast(&self) -> Metric<f32> {
-        Metric {
-            isotropic: self.isotropic as f32,
-            directional: self.directional as f32,
-            direction: self.direction.cast(),
-        }
     }
 }
 
@@ -80,7 +69,7 @@ mod tests {
 
     #[test]
     fn metric_gradient_and_matrix_agree() {
-        let m: Metric = Metric {
+        let m = Metric {
             isotropic: 0.1,
             directional: 1.0,
             direction: Vector3::new(0.6, 0.0, 0.8),

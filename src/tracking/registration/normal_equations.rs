@@ -6,7 +6,7 @@
 
 use super::Metric;
 use super::residual::{PointTerm, RowTerm};
-use nalgebra::{DMatrix, DVector, Matrix6, RealField, Vector3, Vector6};
+use nalgebra::{DMatrix, DVector, Matrix3, Matrix6, Vector3, Vector6};
 use tryon_geometry::math::Twist;
 
 /// One degree of freedom: a unit twist that moves a bone and all bones below it.
@@ -26,39 +26,25 @@ impl Dof {
 }
 
 /// Sums over the points of one bone (after assembly: and of all bones below).
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct BoneSums<T: RealField + Copy = f64> {
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct BoneSums {
     /// Σ w Sᵀ M S.
-    pub hessian: Matrix6<T>,
+    pub hessian: Matrix6<f64>,
     /// Σ w Sᵀ M r.
-    pub gradient: Vector6<T>,
+    pub gradient: Vector6<f64>,
     // Isotropic parts, expanded by `finish`: Σw, Σw p, Σw p pᵀ (xx xy xz yy yz zz).
-    mass: T,
-    first: Vector3<T>,
-    second: [T; 6],
+    mass: f64,
+    first: Vector3<f64>,
+    second: [f64; 6],
 }
 
-impl<T: RealField + Copy> Default for BoneSums<T> {
-    fn default() -> Self {
-        let zero = T::zero();
-        Self {
-            hessian: Matrix6::zeros(),
-            gradient: Vector6::zeros(),
-            mass: zero,
-            first: Vector3::zeros(),
-            second: [zero; 6],
-        }
-    }
-}
-
-impl<T: RealField + Copy> BoneSums<T> {
+impl BoneSums {
     /// Adds the residual `r` (target minus position, metres) of a point at `p`.
-    pub fn add(&mut self, p: &Vector3<T>, r: &Vector3<T>, metric: &Metric<T>, weight: T) {
+    pub fn add(&mut self, p: &Vector3<f64>, r: &Vector3<f64>, metric: &Metric, weight: f64) {
         let d = metric.direction;
         let m = p.cross(&d);
         let s = Vector6::new(d.x, d.y, d.z, m.x, m.y, m.z);
-        self.hessian
-            .ger(metric.directional * weight, &s, &s, T::one());
+        self.hessian.ger(metric.directional * weight, &s, &s, 1.0);
         let g = metric.apply(r) * weight;
         let t = p.cross(&g);
         self.gradient += Vector6::new(g.x, g.y, g.z, t.x, t.y, t.z);
@@ -80,11 +66,9 @@ impl<T: RealField + Copy> BoneSums<T> {
     /// Moves the isotropic parts into the Hessian: `Sᵀ S = [[I, −[p]], [[p], −[p][p]]]`.
     fn finish(&mut self) {
         let f = self.first;
-        let zero = T::zero();
-        let k = nalgebra::Matrix3::new(zero, -f.z, f.y, f.z, zero, -f.x, -f.y, f.x, zero);
+        let k = Matrix3::new(0.0, -f.z, f.y, f.z, 0.0, -f.x, -f.y, f.x, 0.0);
         let [xx, xy, xz, yy, yz, zz] = self.second;
-        let inertia =
-            nalgebra::Matrix3::new(yy + zz, -xy, -xz, -xy, xx + zz, -yz, -xz, -yz, xx + yy);
+        let inertia = Matrix3::new(yy + zz, -xy, -xz, -xy, xx + zz, -yz, -xz, -yz, xx + yy);
         for i in 0..3 {
             self.hessian[(i, i)] += self.mass;
             for j in 0..3 {
@@ -93,7 +77,7 @@ impl<T: RealField + Copy> BoneSums<T> {
                 self.hessian[(i + 3, j + 3)] += inertia[(i, j)];
             }
         }
-        (self.mass, self.first, self.second) = (zero, Vector3::zeros(), [zero; 6]);
+        (self.mass, self.first, self.second) = (0.0, Vector3::zeros(), [0.0; 6]);
     }
 }
 
@@ -108,8 +92,6 @@ pub struct NormalEquations {
     pub gradient: DVector<f64>,
     /// One entry a bone; after [`NormalEquations::assemble`] each holds itself and all bones below.
     pub bones: Vec<BoneSums>,
-    /// The same in single precision, added to `bones` by [`NormalEquations::assemble`].
-    pub single: Vec<BoneSums<f32>>,
 }
 
 /// Unknowns of the root before the first joint angle.
@@ -120,20 +102,13 @@ impl NormalEquations {
     pub fn reset(&mut self, bones: usize) {
         self.bones.clear();
         self.bones.resize(bones, BoneSums::default());
-        self.single.clear();
-        self.single.resize(bones, BoneSums::default());
     }
 
-    /// Adds a point term about `centre`, which is the origin of the twists; `single` sums in f32.
+    /// Adds a point term about `centre`, which is the origin of the twists.
     #[inline]
-    pub fn add_point(&mut self, term: &PointTerm, centre: &Vector3<f64>, single: bool) {
+    pub fn add_point(&mut self, term: &PointTerm, centre: &Vector3<f64>) {
         let p = term.point - centre;
-        if single {
-            let (metric, weight) = (term.metric.cast(), term.weight as f32);
-            self.single[term.bone].add(&p.cast(), &term.residual.cast(), &metric, weight);
-        } else {
-            self.bones[term.bone].add(&p, &term.residual, &term.metric, term.weight);
-        }
+        self.bones[term.bone].add(&p, &term.residual, &term.metric, term.weight);
     }
 
     /// Adds `weight · (slopes · x − residual)²` over the row's angles.
@@ -150,12 +125,7 @@ impl NormalEquations {
     /// freedom moves its bone and everything below; entries of unrelated ones are zero.
     pub fn assemble(&mut self, parents: &[Option<usize>], dofs: &[Dof]) {
         let (hessian, gradient) = (&mut self.hessian, &mut self.gradient);
-        for (sum, single) in self.bones.iter_mut().zip(&mut self.single) {
-            sum.finish();
-            single.finish();
-            sum.hessian += single.hessian.cast::<f64>();
-            sum.gradient += single.gradient.cast::<f64>();
-        }
+        self.bones.iter_mut().for_each(BoneSums::finish);
         for b in (1..self.bones.len()).rev() {
             if let Some(p) = parents[b] {
                 let (h, g) = (self.bones[b].hessian, self.bones[b].gradient);

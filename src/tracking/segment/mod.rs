@@ -1,18 +1,18 @@
 //! The pixels of the person: floor, background, nearest body, edges, body parts.
 
-mod components;
-mod edges;
-mod expected_body;
-mod extremities;
+pub(crate) mod components;
+pub(crate) mod edges;
+pub(crate) mod expected_body;
+pub(crate) mod extremities;
 #[cfg(test)]
 mod fixture;
-mod hands;
+pub(crate) mod hands;
 pub mod part_forest;
-mod person;
+pub(crate) mod person;
 mod plane_bands;
-mod plane_search;
+pub(crate) mod plane_search;
 mod planes;
-mod refusals;
+pub(crate) mod refusals;
 
 pub use edges::{Contour, contour};
 pub use extremities::{Extremity, extremities};

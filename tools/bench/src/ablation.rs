@@ -109,8 +109,6 @@ pub fn variants() -> Vec<Variant> {
     }
     add("hidden feet on the floor", "off", &|c| c.standing = false);
     add("repairs of lost limbs", "off", &|c| c.rescue = false);
-    add("precision of sums", "f64", &|_| {});
-    add("precision of sums", "f32", &|c| c.single_precision = true);
     add("edges", "0.1", &|c| c.edge_weight = 0.1);
     add("edges", "1", &|c| c.edge_weight = 1.0);
     add("free space", "0.1", &|c| c.free_space = 0.1);

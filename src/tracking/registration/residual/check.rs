@@ -310,7 +310,7 @@ impl Scan {
         };
         let mut value = 0.0;
         for (i, (term, now)) in frozen.iter().zip(&now).enumerate() {
-            equations.add_point(term, &chain.centre, false);
+            equations.add_point(term, &chain.centre);
             value += 0.5 * term.weight * term.metric.squared(&now.residual);
             let root = square_root(&term.metric.matrix());
             rows.residual

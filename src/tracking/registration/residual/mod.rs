@@ -2,14 +2,14 @@
 
 #[cfg(test)]
 mod check;
-mod clearance;
-mod edge;
-mod floor;
-mod free_space;
-mod hand;
+pub(crate) mod clearance;
+pub(crate) mod edge;
+pub(crate) mod floor;
+pub(crate) mod free_space;
+pub(crate) mod hand;
 mod limb_motion;
-mod prior;
-mod surface;
+pub(crate) mod prior;
+pub(crate) mod surface;
 mod term;
 
 pub use clearance::{ClearanceResidual, EllipticColumn};

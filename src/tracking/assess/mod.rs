@@ -1,0 +1,13 @@
+//! Assessment of a fitted pose: agreement with its frame, confidence of its joints, person or thing, seated or standing.
+
+pub(crate) mod agreement;
+pub(crate) mod confidence;
+pub(crate) mod person_evidence;
+pub(crate) mod seat;
+
+pub use agreement::Agreement;
+pub(crate) use agreement::{APART, AgreementScratch};
+pub(crate) use confidence::confidence;
+pub use confidence::{ConfidenceReason, JointConfidence};
+pub(crate) use person_evidence::{PersonBelief, PersonEvidence, Verdict};
+pub(crate) use seat::{Seat, sits};

@@ -1,0 +1,214 @@
+//! A subject with a body that was measured before: tracking goes on with it instead of measuring anew, and drops it when
+//! the person who is found is another.
+//!
+//! Evidence of another person: a height that differs from that of the fitted body, a residual that stays far above the
+//! earlier one, or a fit that succeeds only with a new size.
+
+use super::state::TrackerState;
+use super::status::LostReason;
+use super::subject::{StepLog, SubjectFrame};
+use super::workspace::Workspace;
+use crate::model::TrackerModel;
+use crate::shape::{KnownBody, Probation, SizeEstimate};
+use crate::start::outline;
+
+/// Difference between the heights of fitted body and readings from which they are of two persons, metres: hair, soles and
+/// the grid take 3 cm.
+const HEIGHT_TOLERANCE: f64 = 0.06;
+
+impl TrackerState {
+    /// Goes on with a body that was measured before, as soon as somebody is found whom it fits; false for a state that has
+    /// measured a body itself. The body must pass [`KnownBody::check`].
+    pub fn know(&mut self, model: &TrackerModel, known: &KnownBody) -> bool {
+        if self.size.frames > 0 {
+            return false;
+        }
+        self.reset(model);
+        self.subject = known.subject;
+        self.shape = known.shape.clone();
+        self.size = SizeEstimate::known(model.config.calibration_frames);
+        self.probation = Some(Probation::begin(known.residual));
+        true
+    }
+
+    /// Body of the subject once its size has settled.
+    pub fn known_body(&self, model: &TrackerModel) -> Option<KnownBody> {
+        (self.size.frames > 0 && self.is_sized(&model.config)).then(|| KnownBody {
+            subject: self.subject,
+            shape: self.shape.clone(),
+            residual: self.probation.map_or(self.quality[1], |p| p.before),
+        })
+    }
+
+    /// True with a body that was measured before and of which nobody was found yet.
+    pub fn is_known_awaited(&self) -> bool {
+        self.probation.is_some_and(|p| p.frames == 0)
+    }
+}
+
+impl SubjectFrame<'_> {
+    /// [`Self::track`], and again without the known body where that is of another person.
+    pub(crate) fn track_known(
+        &self,
+        state: &mut TrackerState,
+        workspace: &mut Workspace,
+        log: &mut StepLog,
+    ) -> Result<(), LostReason> {
+        let Some(probation) = state.probation else {
+            return self.track(state, workspace, log);
+        };
+        let mut fresh = state.clone();
+        fresh.reset(self.model);
+        let tracked = self.track(state, workspace, log);
+        let is_live = tracked.is_ok() && state.status.is_live();
+        if tracked.is_ok() && !is_live {
+            // In doubt: nothing is compared.
+            return tracked;
+        }
+        if is_live && !self.is_other(state, workspace, probation) {
+            return tracked;
+        }
+        let measured = self.track(&mut fresh, workspace, log);
+        if is_live || measured.is_ok() {
+            *state = fresh;
+            return measured;
+        }
+        tracked
+    }
+
+    /// Adds a live frame to the comparison; true for another person.
+    fn is_other(
+        &self,
+        state: &mut TrackerState,
+        workspace: &mut Workspace,
+        mut probation: Probation,
+    ) -> bool {
+        if probation.frames == 0 && self.has_other_height(state, workspace) {
+            return true;
+        }
+        let is_other = probation.compare(state.quality[1]);
+        state.probation = is_other.is_none().then_some(probation);
+        is_other.unwrap_or(false)
+    }
+
+    /// The fitted body ends elsewhere than the readings along the upright. False where these do not show a whole person.
+    fn has_other_height(&self, state: &TrackerState, workspace: &mut Workspace) -> bool {
+        let up = self.up.cast();
+        let floor = state.world_from_camera.iso().translation.vector.y;
+        let floor = state.floor_known.then_some(floor);
+        let seen = outline(&self.observation, &up, self.person.cut_below, floor);
+        let seen = seen.filter(|_| !self.person.cut_below);
+        let Some(seen) = seen.and_then(|o| o.stature) else {
+            return false;
+        };
+        let crown = self.model.crown;
+        let (vertices, bones) = workspace.posed(self.model, state);
+        let lowest = vertices.iter().map(|v| up.dot(&v.coords));
+        let lowest = lowest.fold(f32::INFINITY, f32::min);
+        let height = self.up.dot(&bones.joints[crown].coords) - f64::from(lowest);
+        (height - seen).abs() > HEIGHT_TOLERANCE
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::shape::PROBATION;
+    use crate::status::Status;
+    use crate::step::follow;
+    use crate::test_scene::TestScene;
+    use tryon_body::BodyShape;
+    use tryon_geometry::camera::RgbdFrame;
+
+    /// A session before somebody at rest.
+    struct Session {
+        scene: TestScene,
+        state: TrackerState,
+        workspace: Workspace,
+    }
+
+    impl Session {
+        /// Before a body of these coefficients.
+        fn before(coefficients: &[f64]) -> Self {
+            let mut scene = TestScene::new(300, 480);
+            scene.model.config.calibration_frames = 4;
+            scene.rest = scene.model.template.personalise(&BodyShape {
+                coefficients: coefficients.to_vec(),
+                ..BodyShape::default()
+            });
+            Self {
+                state: TrackerState::new(&scene.model),
+                workspace: Workspace::default(),
+                scene,
+            }
+        }
+
+        fn follow(&mut self, frames: u32) {
+            let depth = self.scene.depth(&self.scene.pose);
+            for _ in 0..frames {
+                let frame = RgbdFrame {
+                    sequence: self.state.frames,
+                    time_ns: self.state.frames * 33_333_333,
+                    depth: depth.clone(),
+                    color: None,
+                };
+                let (state, workspace) = (&mut self.state, &mut self.workspace);
+                follow(&self.scene.model, state, &frame, workspace).expect("a step");
+            }
+        }
+
+        fn known(&self) -> KnownBody {
+            self.state.known_body(&self.scene.model).expect("settled")
+        }
+    }
+
+    /// The mean body as it was measured, with a number of its own.
+    fn mean_body() -> KnownBody {
+        let mut first = Session::before(&[]);
+        assert_eq!(first.state.known_body(&first.scene.model), None);
+        first.follow(6);
+        let known = first.known();
+        let template = &first.scene.model.template;
+        assert_eq!((known.subject, known.check(template)), (1, Ok(())));
+        KnownBody {
+            subject: 7,
+            ..known
+        }
+    }
+
+    #[test]
+    fn a_known_body_is_tracked_from_the_first_frame_and_not_measured_again() {
+        let known = mean_body();
+        let mut session = Session::before(&[]);
+        assert!(session.state.know(&session.scene.model, &known));
+        assert!(session.state.is_known_awaited());
+        for _ in 0..2 * PROBATION {
+            session.follow(1);
+            assert_eq!(session.state.status, Status::Tracking);
+            assert_eq!(
+                (session.state.subject, &session.known().shape),
+                (7, &known.shape)
+            );
+        }
+        assert_eq!(session.state.probation, None, "it is the same person");
+        assert!(
+            !session.state.know(&session.scene.model, &known),
+            "it has a body"
+        );
+    }
+
+    #[test]
+    fn a_person_of_another_shape_is_measured_from_nothing() {
+        let known = mean_body();
+        for other in [[1.2, 0.0], [-1.2, 0.0], [0.0, 1.5], [0.0, -1.5]] {
+            let mut session = Session::before(&other);
+            session.state.know(&session.scene.model, &known);
+            session.follow(PROBATION + 6);
+            assert_eq!(session.state.subject, 8, "{other:?}");
+            let measured = session.known().shape.coefficients;
+            for (a, b) in measured.iter().zip(other) {
+                assert!((a - b).abs() < 0.7, "{measured:?} for {other:?}");
+            }
+        }
+    }
+}

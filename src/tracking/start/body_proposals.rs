@@ -1,0 +1,200 @@
+//! Proposals of the part forest for one frame: joints, facing, and poses of the body from them.
+
+use super::facing::{Facing, facing};
+use super::joint_proposals::JointProposals;
+use super::proposed_pose::ProposedPoses;
+use crate::fit::{FitContext, FitScratch, evaluate};
+use crate::model::{PartKind, TrackerModel};
+use crate::registration::Observation;
+use crate::segment::part_forest::{PartScratch, PersonCells};
+use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
+use std::f64::consts::PI;
+use tryon_body::parts::{BodyPart, BodySide};
+use tryon_body::{BoneTransforms, Pose};
+use tryon_geometry::math::P3;
+
+/// Longest pair in comparisons of poses that are not fitted yet, metres.
+const REACH: f32 = 0.15;
+/// Confidence above which the facing isn't doubted; 1 to 3 of 100 are wrong beyond it.
+const SURE: f32 = 0.95;
+/// Confidence below which the facing may be anything.
+const DOUBTFUL: f32 = 0.6;
+/// Confidence of a proposed hand or foot that can contradict a pose, and the distance beyond which it does, metres: a third
+/// of the proposed hands are wrong, and right ones lie within 10 cm.
+const HEAVY: f32 = 0.35;
+/// See [`HEAVY`].
+const FAR: f64 = 0.25;
+/// Factor on the cost that a limb elsewhere undercuts.
+const CHEAPER: f64 = 0.98;
+/// Turn from a pose of a moment ago beyond which another must be clearly better, radians: nobody turns around between two
+/// frames, while front and back may cost the same.
+const TURN: f64 = 1.75;
+/// Factor on the cost of such a pose.
+const TURN_COST: f64 = 1.5;
+/// Factor on the cost of a pose that faces away from a certain facing, less 1.
+const AGAINST_FACING: f64 = 0.5;
+
+/// Proposals of one frame.
+pub(crate) struct BodyProposals {
+    joints: JointProposals,
+    flipped: JointProposals,
+    facing: Option<Facing>,
+    /// Unit direction against gravity, camera frame.
+    up: Vector3<f64>,
+}
+
+/// The subject's cells, as the part forest reads them; `up` is the unit vector against gravity, camera frame.
+pub(crate) fn person_cells<'a>(
+    observation: &Observation<'a>,
+    up: &Vector3<f64>,
+) -> PersonCells<'a> {
+    PersonCells {
+        cloud: observation.grid,
+        cells: observation.cells,
+        up: up.cast(),
+    }
+}
+
+impl BodyProposals {
+    /// Classifies the subject's cells. `up` is the unit direction against gravity, camera frame.
+    pub(crate) fn new(
+        model: &TrackerModel,
+        observation: &Observation<'_>,
+        up: &Vector3<f64>,
+        scratch: &mut PartScratch,
+    ) -> Self {
+        let person = person_cells(observation, up);
+        let found = model.forest.propose(&person, scratch);
+        let joints = JointProposals::new(&model.part_classes, &found);
+        Self {
+            flipped: joints.flipped(&model.part_classes),
+            joints,
+            facing: facing(&person, &scratch.yaw),
+            up: *up,
+        }
+    }
+
+    /// Factor on a pose's cost by its root's rotation: 1 along the facing and near that of a moment ago, more beyond a
+    /// quarter turn from the one and after a turn around from the other.
+    pub(crate) fn prior_cost(&self, pose: &Pose, recent: Option<UnitQuaternion<f64>>) -> f64 {
+        let rotation = pose.root.iso().rotation;
+        let has_turned = recent.is_some_and(|r| r.angle_to(&rotation) > TURN);
+        let turn_cost = if has_turned { TURN_COST } else { 1.0 };
+        let confidence = match self.facing {
+            Some(f) if !self.is_doubtful() && self.faces_away(pose) => f64::from(f.confidence),
+            _ => 0.0,
+        };
+        turn_cost * (1.0 + AGAINST_FACING * confidence)
+    }
+
+    /// True for a pose more than a quarter turn from the facing.
+    pub(crate) fn faces_away(&self, pose: &Pose) -> bool {
+        let front = pose.root.iso().rotation * Vector3::z();
+        self.facing
+            .is_some_and(|f| front.dot(&f.front.cast()) < 0.0)
+    }
+
+    /// True where a hand or foot of `bones` is far from all its heavy proposals.
+    pub(crate) fn contradict(&self, model: &TrackerModel, bones: &BoneTransforms) -> bool {
+        let ends = [PartKind::Hand, PartKind::Foot].into_iter();
+        let mut classes =
+            ends.flat_map(|k| [BodySide::Left, BodySide::Right].map(|side| k.class(side)));
+        classes.any(|class| {
+            let is_heavy = self.joints.of_class(class).any(|(_, w)| w > HEAVY);
+            let Some(end) = model.part_classes.anchor_of(class, &bones.joints) else {
+                return false;
+            };
+            let is_far = |(p, _): (P3, f32)| (p.cast::<f64>() - end).norm() > FAR;
+            is_heavy && self.joints.of_class(class).all(is_far)
+        })
+    }
+
+    /// The body at its proposed joints as seen, and in doubt of the facing otherwise; trunk by its joints or upright, each
+    /// limb at the proposal of least cost.
+    pub(crate) fn poses(&self, context: &FitContext<'_>, scratch: &mut FitScratch) -> Vec<Pose> {
+        let mut out = Vec::new();
+        for (joints, turn) in self.hypotheses() {
+            let poses = proposed(context, joints);
+            let upright = self.facing.map(|f| upright(&self.up, &f.front.cast()));
+            let along = upright.and_then(|u| poses.trunk_along(u * about_body(turn)));
+            for trunk in poses.trunk().into_iter().chain(along) {
+                out.push(with_limbs(context, joints, &trunk, scratch).unwrap_or(trunk));
+            }
+        }
+        out
+    }
+
+    /// True where the facing may be anything: half a body, a profile.
+    pub(crate) fn is_doubtful(&self) -> bool {
+        self.facing.is_none_or(|f| f.confidence < DOUBTFUL)
+    }
+
+    /// Joints as seen, and exchanged where the facing isn't sure, each with the turn of an upright trunk from the facing,
+    /// radians.
+    fn hypotheses(&self) -> impl Iterator<Item = (&JointProposals, f64)> {
+        let is_sure = self.facing.is_some_and(|f| f.confidence > SURE);
+        let flipped = (!is_sure).then_some((&self.flipped, PI));
+        std::iter::once((&self.joints, 0.0)).chain(flipped)
+    }
+
+    /// `pose` with each limb moved to its proposed place where that costs less; `None` where it nowhere does.
+    pub(crate) fn limbs_of(
+        &self,
+        context: &FitContext<'_>,
+        pose: &Pose,
+        scratch: &mut FitScratch,
+    ) -> Option<Pose> {
+        let joints = if self.faces_away(pose) {
+            &self.flipped
+        } else {
+            &self.joints
+        };
+        with_limbs(context, joints, pose, scratch)
+    }
+}
+
+/// Rotation of an upright body with a given front, made level; one along the view is taken for the camera's −z.
+pub(crate) fn upright(up: &Vector3<f64>, front: &Vector3<f64>) -> UnitQuaternion<f64> {
+    let level = front - up * up.dot(front);
+    let z = level
+        .try_normalize(f64::EPSILON)
+        .unwrap_or_else(|| -Vector3::z());
+    let axes = Matrix3::from_columns(&[up.cross(&z), *up, z]);
+    UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(axes))
+}
+
+/// Turn about the body's upright, radians.
+pub(crate) fn about_body(turn: f64) -> UnitQuaternion<f64> {
+    UnitQuaternion::from_axis_angle(&Vector3::y_axis(), turn)
+}
+
+/// `pose` with each limb at its proposal of least cost; `None` where all stay.
+fn with_limbs(
+    context: &FitContext<'_>,
+    joints: &JointProposals,
+    pose: &Pose,
+    scratch: &mut FitScratch,
+) -> Option<Pose> {
+    use BodyPart::*;
+    let mut least = evaluate(context, pose, REACH, scratch).cost;
+    let mut best = None;
+    for part in [LeftLeg, RightLeg, LeftArm, RightArm] {
+        let others = proposed(context, joints).limb_poses(best.as_ref().unwrap_or(pose), part);
+        least *= CHEAPER;
+        for other in others {
+            let cost = evaluate(context, &other, REACH, scratch).cost;
+            if cost < least {
+                (least, best) = (cost, Some(other));
+            }
+        }
+    }
+    best
+}
+
+fn proposed<'a>(context: &FitContext<'a>, proposals: &'a JointProposals) -> ProposedPoses<'a> {
+    ProposedPoses {
+        model: context.model,
+        rest: &context.body.rest,
+        proposals,
+    }
+}

@@ -1,0 +1,88 @@
+//! Proposed places of a template's joints, from the part forest.
+
+use crate::model::{NECK_CLASS, PartClasses, PartKind};
+use crate::segment::part_forest::JointProposal;
+use tryon_body::parts::BodySide;
+use tryon_geometry::math::P3;
+
+/// Largest distance between the halves of one head, metres.
+const HEAD: f32 = 0.20;
+
+/// A place for the middle of two joints, or of one joint twice.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ProposedAnchor {
+    /// Joints of the template.
+    pub joints: [usize; 2],
+    /// Class that proposes it.
+    pub class: u8,
+    /// Place, camera frame, metres.
+    pub position: P3,
+    /// Confidence, 0 to 1.
+    pub weight: f32,
+}
+
+/// Proposals of one frame.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct JointProposals {
+    /// Heaviest first within a class.
+    pub anchors: Vec<ProposedAnchor>,
+}
+
+impl JointProposals {
+    /// Proposals for the anchors of a template. The halves of the head become one place.
+    pub fn new(classes: &PartClasses, proposals: &[JointProposal]) -> Self {
+        let mut anchors = Vec::with_capacity(proposals.len());
+        for p in proposals {
+            let Some(joints) = classes.anchor(p.class) else {
+                continue;
+            };
+            anchors.push(ProposedAnchor {
+                joints,
+                class: p.class,
+                position: p.position,
+                weight: p.weight,
+            });
+        }
+        join_heads(&mut anchors);
+        Self { anchors }
+    }
+    /// The proposals of the opposite facing: left and right change places.
+    pub fn flipped(&self, classes: &PartClasses) -> Self {
+        let head = PartKind::Head.class(BodySide::Left);
+        let mut anchors = self.anchors.clone();
+        for a in anchors
+            .iter_mut()
+            .filter(|a| ![NECK_CLASS, head].contains(&a.class))
+        {
+            a.class ^= 1;
+            a.joints = classes.anchor(a.class).unwrap_or(a.joints);
+        }
+        anchors.sort_by(|a, b| a.class.cmp(&b.class).then(b.weight.total_cmp(&a.weight)));
+        Self { anchors }
+    }
+    /// Places of a class's anchor, heaviest first.
+    pub fn of_class(&self, class: u8) -> impl Iterator<Item = (P3, f32)> + '_ {
+        let own = self.anchors.iter().filter(move |a| a.class == class);
+        own.map(|a| (a.position, a.weight))
+    }
+}
+
+/// Replaces both halves of the head by their weighted middle under the left class; a lone half stays.
+fn join_heads(anchors: &mut Vec<ProposedAnchor>) {
+    let class = |side| PartKind::Head.class(side);
+    let [left, right] = [class(BodySide::Left), class(BodySide::Right)];
+    let first = |c: u8| anchors.iter().position(|a| a.class == c);
+    if let (Some(l), Some(r)) = (first(left), first(right)) {
+        let (a, b) = (anchors[l], anchors[r]);
+        if (a.position - b.position).norm() < HEAD {
+            let sum = (a.weight + b.weight).max(f32::MIN_POSITIVE);
+            anchors[l].position = a.position + (b.position - a.position) * (b.weight / sum);
+            anchors[l].weight = a.weight.max(b.weight);
+            anchors.remove(r);
+        }
+    }
+    for a in anchors.iter_mut().filter(|a| a.class == right) {
+        a.class = left;
+    }
+    anchors.sort_by(|a, b| a.class.cmp(&b.class).then(b.weight.total_cmp(&a.weight)));
+}
