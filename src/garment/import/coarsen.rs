@@ -5,6 +5,7 @@
 use crate::{GarmentMesh, RenderMesh};
 use std::collections::{BTreeMap, BTreeSet};
 use tryon_geometry::math::P3;
+use tryon_geometry::math::order_statistics::median;
 use tryon_geometry::mesh::{Face, sides, undirected};
 
 /// Edges shorter than this times the target are collapsed (Botsch & Kobbelt 2004).
@@ -180,13 +181,9 @@ impl Coarsener {
 
 /// Median length of the edges at rest, metres.
 pub fn median_edge(g: &GarmentMesh) -> f64 {
-    let mut l: Vec<f64> = g
-        .rest
-        .iter()
-        .flat_map(|t| (0..3).map(|k| length(sub(t[(k + 1) % 3], t[k]))))
-        .collect();
-    l.sort_unstable_by(f64::total_cmp);
-    l.get(l.len() / 2).copied().unwrap_or(0.0)
+    let lengths = |t: &[[f64; 2]; 3]| [0, 1, 2].map(|k| length(sub(t[(k + 1) % 3], t[k])));
+    let mut all: Vec<f64> = g.rest.iter().flat_map(lengths).collect();
+    median(&mut all).unwrap_or(0.0)
 }
 
 /// The same panels and seams on some of the vertices, with edges of about `target` metres at rest; and their positions.

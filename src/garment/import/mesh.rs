@@ -5,6 +5,7 @@ use crate::{GarmentError, GarmentKind, GarmentMesh, Material, Region, RenderMesh
 use std::collections::BTreeSet;
 use tryon_formats::sewn_obj::{SewnObj, Stitch};
 use tryon_geometry::math::P3;
+use tryon_geometry::math::order_statistics::percentile;
 use tryon_geometry::mesh::{Face, Topology, TriMesh, UnionFind, sides};
 
 /// Garment from a mesh, with the positions of its vertices in the file.
@@ -183,12 +184,7 @@ fn flat_rest(sewn: &SewnObj) -> Option<Vec<[[f64; 2]; 3]>> {
                 / (p[1] - p[0]).norm().max(f64::MIN_POSITIVE)
         })
         .collect();
-    ratio.sort_by(f64::total_cmp);
-    let at = |share: usize| {
-        ratio
-            .get(ratio.len() * share / 100)
-            .map(|r| (r - 1.0).abs())
-    };
+    let mut at = |share| percentile(&mut ratio, share).map(|r| (r - 1.0).abs());
     (at(50)? < SAME_SCALE && at(25)? < ISOMETRIC && at(75)? < ISOMETRIC).then_some(rest)
 }
 
