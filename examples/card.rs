@@ -13,6 +13,7 @@ use tryon::dressing::{DressOptions, Dressed, dress};
 use tryon::formats::image::write_png_rgb;
 use tryon::garment::{Size, library};
 use tryon::geometry::camera::ColorImage;
+use tryon::geometry::math::order_statistics::percentile;
 use tryon::geometry::math::{P3, World};
 use tryon::mirror::{CameraGarments, DrawnSurface, library_appearance};
 use tryon::synth::{Actor, Sequence, Setting};
@@ -167,7 +168,7 @@ fn timed(
         }
         last = Some(drawn);
     }
-    times.sort_by(f64::total_cmp);
+    let [middle, most] = [50, 99].map(|p| percentile(&mut times, p).unwrap_or(0.0));
     let (image, report) = last.expect("at least one");
     let stages: Vec<String> = report
         .stages_ms
@@ -176,12 +177,7 @@ fn timed(
         .collect();
     (
         image,
-        format!(
-            "{:.2} / {:.2} ({})",
-            times[times.len() / 2],
-            times[times.len() * 99 / 100],
-            stages.join(", ")
-        ),
+        format!("{middle:.2} / {most:.2} ({})", stages.join(", ")),
     )
 }
 

@@ -14,6 +14,7 @@ use tryon::cloth::Config;
 use tryon::cloth::contact::MapDetail;
 use tryon::dressing::Dressed;
 use tryon::geometry::math::P3;
+use tryon::geometry::math::order_statistics::percentile;
 use tryon::geometry::par::with_threads;
 use tryon_bench::dance::{DanceReport, load};
 use tryon_bench::{OutfitSpec, Solid};
@@ -184,8 +185,6 @@ fn draw_cells(template: &Template, body: &[P3], dressed: &Dressed) -> [Vec<u8>; 
 }
 
 fn print_report(report: &DanceReport) {
-    let mut ms = report.ms.clone();
-    ms.sort_unstable_by(f64::total_cmp);
     println!(
         "{} vertices, dressed in {:.0} ms; {:.1} ms for 1/60 s (median; p90 {:.1}; maps {:.1}, contact {:.1}, steps {:.1}), \
          stiffness kept {:.2}, faults {}\n\
@@ -193,7 +192,7 @@ fn print_report(report: &DanceReport) {
         report.vertices,
         report.dressing_ms,
         report.median_ms(),
-        ms[ms.len() * 9 / 10],
+        percentile(&mut report.ms.clone(), 90).unwrap_or(0.0),
         report.stages_ms[0],
         report.stages_ms[1],
         report.stages_ms[2],

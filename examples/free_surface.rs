@@ -16,6 +16,7 @@ use tryon::clothcap::scan::BodyScan;
 use tryon::formats::scan::ScanMesh;
 use tryon::geometry::linear::{Factor, SymbolicFactor, SymmetricPattern};
 use tryon::geometry::math::P3;
+use tryon::geometry::math::order_statistics::median;
 use tryon::geometry::mesh::{TriMesh, face_normal};
 use tryon::geometry::par::with_threads;
 use tryon_bench::garment_capture::capture_scenes;
@@ -130,11 +131,6 @@ impl Clock {
     }
 }
 
-fn median(mut times: Vec<f64>) -> f64 {
-    times.sort_by(f64::total_cmp);
-    times[times.len() / 2]
-}
-
 /// Writes values as raw little-endian bytes.
 fn write<const N: usize>(path: &Path, bytes: impl Iterator<Item = [u8; N]>) -> std::io::Result<()> {
     fs::write(path, bytes.flatten().collect::<Vec<u8>>())
@@ -197,8 +193,8 @@ fn run(folder: &Path) -> Result<(), Fault> {
     floats("entries.f64", system.entries())?;
     floats("rhs.f64", system.rhs.concat())?;
     floats("solution.f64", solution.concat())?;
-    let [analysis, factorisation, solve] = laps.map(median);
-    let fit = median(fits);
+    let [analysis, factorisation, solve] = laps.map(|mut ms| median(&mut ms).unwrap_or(0.0));
+    let fit = median(&mut fits).unwrap_or(0.0);
     println!(
         "free surface {fit:.0} ms, analysis {analysis:.1}, factorisation {factorisation:.1}, solve {solve:.1} ms"
     );

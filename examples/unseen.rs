@@ -18,6 +18,7 @@ use tryon::formats::image::write_png_rgb;
 use tryon::formats::open_recording;
 use tryon::garment::library;
 use tryon::geometry::camera::{Calibration, ColorImage, RgbdFrame};
+use tryon::geometry::math::order_statistics::median;
 use tryon::geometry::math::{P3, World};
 use tryon::geometry::mesh::Face;
 use tryon::geometry::par::{Par, with_threads};
@@ -292,15 +293,10 @@ fn measure(a: &Args, t: &Tracked, drawn: &[Drawn]) -> Measured {
     assert!(is_same, "pictures differ");
     let (image, report) = last.pop().unwrap();
     Measured {
-        medians: times.map(|lists| lists.map(median)),
+        medians: times.map(|lists| lists.map(|mut ms| median(&mut ms).unwrap_or(0.0))),
         image,
         report,
     }
-}
-
-fn median(mut ms: Vec<f64>) -> f64 {
-    ms.sort_by(f64::total_cmp);
-    ms[ms.len() / 2]
 }
 
 impl Measured {

@@ -1,9 +1,9 @@
 //! Two sheets of springs above a sphere, their contact candidates by brute force, and additive CCD.
 
-use std::collections::BTreeSet;
 use std::f64::consts::{PI, TAU};
 use tryon::cloth::contact::{ActivePair, ContactPair};
 use tryon::geometry::math::V3d;
+use tryon::geometry::mesh::edges;
 
 /// Vertices along a side of a sheet.
 const SIDE: usize = 12;
@@ -45,10 +45,7 @@ impl Scene {
         scene.cloth = scene.rest.len();
         scene.vertex_mass = 2.0 * DENSITY * LENGTH * LENGTH / scene.cloth as f64;
         scene.add_sphere();
-        let sides = |f: &[u32; 3]| [[f[0], f[1]], [f[1], f[2]], [f[2], f[0]]];
-        let edges = scene.faces.iter().flat_map(sides);
-        let sorted: BTreeSet<[u32; 2]> = edges.map(|[a, b]| [a.min(b), a.max(b)]).collect();
-        scene.edges = sorted.into_iter().collect();
+        scene.edges = edges(&scene.faces);
         scene
     }
     fn add_sheet(&mut self, centre: V3d) {

@@ -12,6 +12,7 @@ use std::collections::BTreeMap;
 use std::f32::consts::TAU;
 use tryon_body::Template;
 use tryon_geometry::math::V3;
+use tryon_geometry::math::order_statistics::median;
 use tryon_geometry::mesh::vertex_normals;
 use tryon_geometry::par::Par;
 
@@ -200,9 +201,7 @@ fn reweigh(ring: &[(usize, RingColor)], channel: usize, (gains, weights): (&Gain
         .iter()
         .map(|(k, cell)| f64::from(cell.logs[channel]) - f64::from(cell.level) * gains[*k]);
     let left: Vec<f64> = left.collect();
-    let mut sorted = left.clone();
-    sorted.sort_by(f64::total_cmp);
-    let middle = sorted.get(sorted.len() / 2).copied().unwrap_or(0.0);
+    let middle = median(&mut left.clone()).unwrap_or(0.0);
     for (w, x) in weights.iter_mut().zip(&left) {
         *w = ROBUST / (x - middle).abs().max(ROBUST);
     }

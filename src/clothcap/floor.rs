@@ -3,6 +3,7 @@
 use rand::{Rng, SeedableRng};
 use rand_pcg::Pcg32;
 use std::collections::HashSet;
+use tryon_geometry::math::order_statistics::quantile;
 use tryon_geometry::math::{P3, V3, principal_axes};
 
 /// Points that planes are searched among.
@@ -199,12 +200,7 @@ fn spread(values: impl Iterator<Item = f32>) -> f32 {
 /// Range of some finite values without a share of them at each end; zeros without any.
 pub(super) fn inner_range(values: impl Iterator<Item = f32>, strays: f64) -> [f32; 2] {
     let mut all: Vec<f32> = values.collect();
-    all.sort_by(f32::total_cmp);
-    let last = all.len().saturating_sub(1) as f64;
-    [strays, 1.0 - strays].map(|share| {
-        let at = (share * last).round() as usize;
-        all.get(at).copied().unwrap_or(0.0)
-    })
+    [strays, 1.0 - strays].map(|share| quantile(&mut all, share).unwrap_or(0.0))
 }
 
 #[cfg(test)]

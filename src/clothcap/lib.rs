@@ -45,7 +45,6 @@ mod captured_outfit;
 mod cloud;
 mod dress_body;
 mod error;
-mod face_edges;
 mod floor;
 mod layers;
 pub mod mrf;

@@ -1,9 +1,9 @@
 //! Colours of a garment's vertices: means of the scan points there, spread over vertices without any.
 
-use super::face_edges::{edges, neighbours};
 use super::multi::ClothPart;
 use super::scan::BodyScan;
 use super::segmenter::SegmentedScan;
+use tryon_geometry::mesh::{Csr, edges};
 
 /// Colour of a garment without a coloured point, sRGB.
 const GREY: f32 = 160.0;
@@ -14,7 +14,7 @@ pub(super) fn part_colors(
     segmented: &SegmentedScan,
     scan: &BodyScan,
 ) -> Vec<[u8; 3]> {
-    let around = neighbours(part.nodes.len(), &edges(&part.faces));
+    let around = Csr::of_edges(part.nodes.len(), &edges(&part.faces));
     let own = |(v, hidden): (&u32, &bool)| {
         let row = segmented.nodes.points.row(*v as usize);
         // Hair and arms lie over garments.

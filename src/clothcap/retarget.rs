@@ -2,7 +2,6 @@
 
 use super::CaptureError;
 use super::align::{QuadraticEnergy, Stencil};
-use super::face_edges::edges;
 use super::multi::ClothPart;
 use super::unpose::blended;
 use serde::{Deserialize, Serialize};
@@ -10,6 +9,7 @@ use tryon_body::{BoneTransforms, Template};
 use tryon_cloth::contact::{ClosestPoint, CollisionBody, CollisionModel, CollisionWorkspace, Part};
 use tryon_cloth::{Config, collision_model};
 use tryon_geometry::math::{P3, V3};
+use tryon_geometry::mesh::edges;
 use tryon_geometry::par::{self, Par};
 use tryon_geometry::spatial::Bvh;
 

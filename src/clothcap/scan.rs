@@ -3,14 +3,13 @@
 use super::CaptureError;
 pub(super) use super::cloud::mean_spacing;
 use super::cloud::{are_strays, neighbour_edges, plane_normals, spatial_order, turn_outwards};
-use super::face_edges::edges;
 use super::floor::{Floor, are_floor_rests, inner_range};
 use nalgebra::{Rotation3, Vector3};
 use serde::{Deserialize, Serialize};
 use tryon_formats::TexturePoint;
 use tryon_formats::scan::ScanMesh;
 use tryon_geometry::math::{P3, V3};
-use tryon_geometry::mesh::Face;
+use tryon_geometry::mesh::{Face, edges};
 
 /// Least number of points of a person. Fewer leave whole limbs without one.
 const LEAST_POINTS: usize = 500;

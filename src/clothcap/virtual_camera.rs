@@ -3,7 +3,7 @@
 use super::cloud::mean_spacing;
 use super::scan::{BodyScan, axis_range};
 use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
-use tryon_geometry::camera::{Calibration, DepthImage, Intrinsics, RgbdFrame};
+use tryon_geometry::camera::{Calibration, Intrinsics, NoiseModel, RgbdFrame};
 use tryon_geometry::math::{Camera, P3, Rigid, World};
 use tryon_geometry::par::Par;
 use tryon_geometry::raster::{Options, View, VisibilityBuffer, rasterise_with};
@@ -66,9 +66,8 @@ impl VirtualCamera {
         let mut points = Vec::new();
         let camera_from_world = self.world_from_camera.inverse();
         camera_from_world.points_f32(&scan.points, &mut points);
-        let mut depth = DepthImage::empty(camera.width, camera.height);
-        if is_torn(scan) {
-            splat(&camera, &points, depth.data_mut());
+        let metres = if is_torn(scan) {
+            splat(&camera, &points)
         } else {
             let view = View::Perspective { camera, near: NEAR };
             let mut buffer = VisibilityBuffer::default();
@@ -77,14 +76,12 @@ impl VirtualCamera {
                 ..Options::default()
             };
             rasterise_with(options, &view, &points, &scan.faces, &mut buffer);
-            for (d, z) in depth.data_mut().iter_mut().zip(&buffer.depth) {
-                *d = to_millimetres(*z);
-            }
-        }
+            buffer.depth
+        };
         RgbdFrame {
             sequence: 0,
             time_ns: 0,
-            depth,
+            depth: NoiseModel::None.apply(&camera, &metres, 0, 0),
             color: None,
         }
     }
@@ -95,8 +92,9 @@ fn is_torn(scan: &BodyScan) -> bool {
     (scan.faces.len() as f64) < TORN * scan.points.len() as f64
 }
 
-/// Draws each point of a cloud as a square that faces the camera.
-fn splat(camera: &Intrinsics, points: &[P3], depth: &mut [u16]) {
+/// Depth of each pixel of a cloud, metres, infinite beside it: each point is drawn as a square that faces the camera.
+fn splat(camera: &Intrinsics, points: &[P3]) -> Vec<f32> {
+    let mut depth = vec![f32::INFINITY; (camera.width * camera.height) as usize];
     let side = SPLAT * mean_spacing(points);
     for p in points.iter().filter(|p| p.z > NEAR) {
         let q = camera.project(p);
@@ -109,21 +107,11 @@ fn splat(camera: &Intrinsics, points: &[P3], depth: &mut [u16]) {
         for row in range(q.y, camera.height) {
             for column in range(q.x, camera.width) {
                 let slot = &mut depth[(row * camera.width + column) as usize];
-                let z = to_millimetres(p.z);
-                if z > 0 && (*slot == 0 || z < *slot) {
-                    *slot = z;
-                }
+                *slot = slot.min(p.z);
             }
         }
     }
-}
-
-fn to_millimetres(z: f32) -> u16 {
-    if z.is_finite() && z > 0.0 {
-        (z * 1e3).round().min(f32::from(u16::MAX)) as u16
-    } else {
-        0
-    }
+    depth
 }
 
 /// Share of points left out at each end of an axis: strays.

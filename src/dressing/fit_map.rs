@@ -12,6 +12,7 @@ use tryon_cloth::contact::{SurfaceFrame, SurfaceModel};
 use tryon_cloth::{ClothError, Sheet};
 use tryon_cloth::{Model, State};
 use tryon_garment::{GarmentMesh, Region};
+use tryon_geometry::math::order_statistics::percentile;
 use tryon_geometry::math::{P3, V3d};
 use tryon_geometry::par::Par;
 
@@ -287,12 +288,10 @@ impl WornGarment<'_> {
             if total < LEAST_AREA {
                 continue;
             }
-            let percentile = |value: &dyn Fn(&VertexFit) -> f32| {
+            let most = |value: &dyn Fn(&VertexFit) -> f32| {
                 let free = own.iter().filter(|i| !held.contains(&(**i as u32)));
                 let mut all: Vec<f32> = free.map(|i| value(&fits[*i])).collect();
-                all.sort_unstable_by(f32::total_cmp);
-                all.get((all.len() * PERCENTILE / 100).min(all.len().saturating_sub(1)))
-                    .map_or(0.0, |v| f64::from(*v))
+                percentile(&mut all, PERCENTILE).map_or(0.0, f64::from)
             };
             let mean = |value: &dyn Fn(&VertexFit) -> f32| {
                 own.iter()
@@ -301,13 +300,13 @@ impl WornGarment<'_> {
                     / total
             };
             let touching = mean(&|v| f32::from(u8::from(v.pressure > 0.0)));
-            let stretch = [mean(&|v| v.stretch), percentile(&|v| v.stretch)];
+            let stretch = [mean(&|v| v.stretch), most(&|v| v.stretch)];
             let on_skin = if touching > 0.0 {
                 mean(&|v| v.pressure) / touching
             } else {
                 0.0
             };
-            let pressure = [on_skin, percentile(&|v| v.pressure)];
+            let pressure = [on_skin, most(&|v| v.pressure)];
             let gap = mean(&|v| v.gap);
             let fit = if stretch[1] > TIGHT_STRETCH || pressure[0] > TIGHT_PRESSURE {
                 FitClass::Tight

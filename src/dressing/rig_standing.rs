@@ -2,7 +2,7 @@
 
 use nalgebra::{UnitQuaternion, Vector3};
 use tryon_body::{BoneTransforms, Pose, RestBody, Template, embedded, rig, skin};
-use tryon_geometry::camera::{Calibration, DepthImage, Intrinsics, RgbdFrame};
+use tryon_geometry::camera::{Calibration, DepthImage, Intrinsics, NoiseModel, RgbdFrame};
 use tryon_geometry::math::{Camera, Rigid, V3d, World};
 use tryon_geometry::mesh::TriMesh;
 use tryon_geometry::par::Par;
@@ -30,7 +30,7 @@ const UNFITTED: f64 = 1.0;
 pub fn rig_standing(mesh: TriMesh) -> Result<(Template, f64), String> {
     let camera = Intrinsics::KINECT_V1;
     let world_from_camera = camera_facing(&mesh, &camera)?;
-    let depth = render(&mesh, camera, &world_from_camera.inverse())?;
+    let depth = render(&mesh, camera, &world_from_camera.inverse());
     let model = TrackerModel::new(
         embedded::template(),
         Calibration::registered(camera),
@@ -84,21 +84,13 @@ fn render(
     mesh: &TriMesh,
     camera: Intrinsics,
     camera_from_world: &Rigid<Camera, World>,
-) -> Result<DepthImage, String> {
+) -> DepthImage {
     let mut vertices = Vec::new();
     camera_from_world.points_f32(mesh.vertices(), &mut vertices);
     let mut buffer = VisibilityBuffer::default();
     let view = View::Perspective { camera, near: NEAR };
     rasterise(&view, &vertices, mesh.faces(), &mut buffer);
-    let millimetres = |z: &f32| {
-        if z.is_finite() {
-            (z * 1e3).round() as u16
-        } else {
-            0
-        }
-    };
-    let depth = buffer.depth.iter().map(millimetres).collect();
-    DepthImage::new(camera.width, camera.height, depth).map_err(|e| e.to_string())
+    NoiseModel::None.apply(&camera, &buffer.depth, 0, 0)
 }
 
 fn track_still(model: &TrackerModel, depth: &DepthImage) -> Result<TrackerState, String> {

@@ -26,7 +26,6 @@ mod presets;
 mod size;
 mod subdivision;
 mod triangulate;
-mod union_find;
 
 pub use error::GarmentError;
 pub use fabric_image::FabricImage;

@@ -1,11 +1,10 @@
 //! Sewn garment: one welded simulation mesh whose triangles keep their flat rest shape.
 
 use super::triangulate::{PanelMesh, triangulate};
-use super::union_find::UnionFind;
 use super::{Anchor, GarmentError, GarmentKind, Material, Panel, Pattern, Placement, Side, Size};
 use serde::{Deserialize, Serialize};
 use tryon_geometry::math::P3;
-use tryon_geometry::mesh::{Face, Topology, TriMesh};
+use tryon_geometry::mesh::{Face, Topology, TriMesh, UnionFind};
 
 /// Gap between panels in texture space, metres.
 const TEXTURE_GAP: f64 = 0.02;

@@ -8,10 +8,12 @@
 //! - Twists, exponential maps (eq. 1): [`mod@math::lie`].
 //! - Typed frames: [`mod@math::frames`].
 //! - Nearest rotation: [`mod@math::polar`].
+//! - Medians, percentiles, quantiles: [`mod@math::order_statistics`].
 //! - Finite-difference check of energies and residuals: [`mod@math::derivative_check`].
 //! - Deterministic parallel loops: [`mod@par`].
 //! - Spin barrier: [`mod@par::lockstep`].
-//! - Edges, neighbours, boundaries: [`mod@mesh::topology`].
+//! - Edges, neighbours, boundaries: [`mod@mesh::topology`], of any faces [`mod@mesh::edges`].
+//! - Disjoint sets: [`mod@mesh::union_find`].
 //! - Remeshing: [`mod@mesh::remesh`].
 //! - Sparse Cholesky, conjugate gradients: [`mod@linear::cholesky`], [`mod@linear::conjugate_gradient`].
 //! - Refit BVH, inside tests: [`mod@spatial::bvh`].

@@ -13,6 +13,7 @@ use tryon_clothcap::topology::ClothTemplate;
 use tryon_dressing::{MeshGarment, MeshGarmentError, SourceBody};
 use tryon_formats::FormatError;
 use tryon_garment::{FabricImage, Material, RenderMesh};
+use tryon_geometry::math::order_statistics::medians;
 use tryon_geometry::math::{P3, V3};
 use tryon_geometry::spatial::{Bvh, SurfacePoint};
 
@@ -193,11 +194,5 @@ fn color(part: &ClothPart, colors: &[[u8; 3]]) -> Option<[u8; 3]> {
         .iter()
         .zip(&part.hidden)
         .filter(|(_, hidden)| !**hidden);
-    let seen: Vec<[u8; 3]> = seen.map(|(c, _)| *c).collect();
-    let median = |k: usize| {
-        let mut channel: Vec<u8> = seen.iter().map(|c| c[k]).collect();
-        channel.sort_unstable();
-        channel[channel.len() / 2]
-    };
-    (!seen.is_empty()).then(|| std::array::from_fn(median))
+    medians(&seen.map(|(c, _)| *c).collect::<Vec<_>>())
 }

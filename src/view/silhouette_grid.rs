@@ -6,6 +6,7 @@
 use super::area::Area;
 use super::coverage::PixelCoverage;
 use std::ops::Range;
+use tryon_geometry::math::order_statistics::median;
 
 /// Share of alpha from which a pixel shows the captured scene in front of the garment.
 const HIDDEN: f32 = 0.5;
@@ -76,11 +77,7 @@ impl DressedArea<'_> {
         let sampled = (0..self.pixels.len()).step_by(step);
         let readings = sampled.filter(|i| self.depth[*i] > 0.0 && self.is_garment(*i));
         let mut depths: Vec<f32> = readings.map(|i| self.depth[i]).collect();
-        if depths.is_empty() {
-            return None;
-        }
-        let middle = depths.len() / 2;
-        Some(*depths.select_nth_unstable_by(middle, f32::total_cmp).1)
+        median(&mut depths)
     }
 }
 

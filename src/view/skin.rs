@@ -3,6 +3,8 @@
 //! Skin is one normal distribution of brightness and chroma, clothes a mixture of [`KINDS`] (shirt, trousers, their
 //! shadows).
 
+use tryon_geometry::math::order_statistics::medians;
+
 /// Least number of tones of a class.
 pub(super) const MIN_TONES: usize = 12;
 
@@ -115,13 +117,8 @@ impl SkinClassifier {
             return None;
         }
         // Trims tones beside a limb that is tracked a little off: farther from the median than most.
-        let median = |k: usize| {
-            let mut x: Vec<f32> = skin.iter().map(|c| c[k]).collect();
-            let middle = x.len() / 2;
-            *x.select_nth_unstable_by(middle, f32::total_cmp).1
-        };
-        let middle = [median(1), median(2)];
-        let off = |c: &[f32; 3]| (c[1] - middle[0]).abs() + (c[2] - middle[1]).abs();
+        let middle: [f32; 3] = medians(skin)?;
+        let off = |c: &[f32; 3]| (c[1] - middle[1]).abs() + (c[2] - middle[2]).abs();
         let mut kept = skin.to_vec();
         kept.sort_by(|a, b| off(a).total_cmp(&off(b)));
         kept.truncate(skin.len() * KEPT[0] / KEPT[1]);

@@ -10,6 +10,7 @@ use super::input::{GarmentView, Input};
 use super::viewport::Viewport;
 use std::ops::Range;
 use std::sync::atomic::{AtomicBool, Ordering};
+use tryon_geometry::math::order_statistics::median;
 use tryon_geometry::math::{P3, V3};
 use tryon_geometry::mesh::Face;
 use tryon_geometry::raster::{
@@ -117,8 +118,7 @@ impl Surface {
             .step_by(DISTANCE_STRIDE)
             .map(|p| p.z)
             .collect();
-        z.sort_by(f32::total_cmp);
-        self.distance = z.get(z.len() / 2).copied().unwrap_or(1.0).max(NEAR);
+        self.distance = median(&mut z).unwrap_or(1.0).max(NEAR);
     }
 
     /// Appends one garment, displaced by `nearer` metres along the line of sight, which keeps its outline.

@@ -100,13 +100,5 @@ pub(crate) fn picture(template: &Template, camera: Intrinsics, pose: &Pose) -> D
     let view = View::Perspective { camera, near: 0.2 };
     let mut buffer = VisibilityBuffer::default();
     rasterise(&view, &vertices, template.mesh().faces(), &mut buffer);
-    let mm = |z: &f32| {
-        if z.is_finite() {
-            (z * 1e3).round() as u16
-        } else {
-            0
-        }
-    };
-    let data = buffer.depth.iter().map(mm).collect();
-    DepthImage::new(camera.width, camera.height, data).expect("size")
+    NoiseModel::None.apply(&camera, &buffer.depth, 0, 0)
 }

@@ -2,6 +2,7 @@
 //! was measured.
 
 use tryon::geometry::camera::{ColorImage, DepthImage, Intrinsics};
+use tryon::geometry::math::order_statistics::quantile;
 use tryon::geometry::math::{P3, V3};
 use tryon::geometry::mesh::Face;
 use tryon::geometry::par::Par;
@@ -14,7 +15,7 @@ const OPACITY: f32 = 0.65;
 /// Nearest drawn surface, metres.
 const NEAR: f32 = 0.05;
 /// Shares of the readings below and above the range of greys.
-const RANGE: [f32; 2] = [0.01, 0.99];
+const RANGE: [f64; 2] = [0.01, 0.99];
 /// Greys of the nearest and farthest reading of the range.
 const GREYS: [f32; 2] = [225.0, 45.0];
 /// Colours of [`Place`], in its order.
@@ -93,12 +94,7 @@ pub(crate) fn overlay(
 /// Depth of the nearest and farthest reading that keep a grey of their own, metres.
 fn grey_range(readings: &[f32]) -> [f32; 2] {
     let mut known: Vec<f32> = readings.iter().copied().filter(|d| *d > 0.0).collect();
-    known.sort_by(f32::total_cmp);
-    let last = known.len().saturating_sub(1) as f32;
-    RANGE.map(|share| {
-        let at = (share * last).round() as usize;
-        known.get(at).copied().unwrap_or(0.0)
-    })
+    RANGE.map(|share| quantile(&mut known, share).unwrap_or(0.0))
 }
 
 /// Grey of a reading; black without one.

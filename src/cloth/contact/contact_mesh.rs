@@ -1,6 +1,6 @@
 //! Collision mesh: cloth and obstacle in one index space, their edges, and the pairs that never count as contact.
 
-use tryon_geometry::mesh::Face;
+use tryon_geometry::mesh::{Face, edges};
 
 /// Cloth and obstacle surfaces. Vertices, faces and edges of the obstacle follow those of the cloth.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -62,14 +62,14 @@ impl ContactMesh {
         let moved = obstacle.faces.iter().map(|f| f.map(|v| v + offset));
         let faces: Vec<Face> = cloth.faces.iter().copied().chain(moved).collect();
         let (own, other) = faces.split_at(cloth.faces.len());
-        let mut edges = unique_edges(own);
-        let cloth_edges = edges.len() as u32;
-        edges.extend(unique_edges(other));
+        let mut all = edges(own);
+        let cloth_edges = all.len() as u32;
+        all.extend(edges(other));
         Ok(Self {
             vertices: [offset, total as u32],
             cloth_faces: cloth.faces.len() as u32,
             faces,
-            edges,
+            edges: all,
             cloth_edges,
             excluded: Vec::new(),
         })
@@ -138,20 +138,6 @@ fn check_range(
         .enumerate()
         .find_map(outside)
         .map_or(Ok(()), Err)
-}
-
-/// Edges of some triangles, ascending; sides of zero length by index are left out.
-fn unique_edges(faces: &[Face]) -> Vec<[u32; 2]> {
-    let side = |a: u32, b: u32| [a.min(b), a.max(b)];
-    let sides = |[a, b, c]: &Face| [side(*a, *b), side(*b, *c), side(*c, *a)];
-    let mut edges: Vec<_> = faces
-        .iter()
-        .flat_map(sides)
-        .filter(|e| e[0] != e[1])
-        .collect();
-    edges.sort_unstable();
-    edges.dedup();
-    edges
 }
 
 #[cfg(test)]

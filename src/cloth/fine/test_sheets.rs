@@ -7,7 +7,7 @@ use crate::elastic::{
 };
 use nalgebra::Vector2;
 use tryon_geometry::math::V3d;
-use tryon_geometry::mesh::Face;
+use tryon_geometry::mesh::{Face, edges};
 
 /// Acceleration of gravity (m/s²), down along y.
 pub(super) const GRAVITY: f64 = 9.81;
@@ -138,13 +138,8 @@ pub(super) fn exhaustive_crossings(
     let all: Vec<V3d> = x.iter().chain(obstacle).copied().collect();
     let moved = obstacle_faces.iter().map(|f| f.map(|v| v + cloth));
     let faces: Vec<Face> = faces.iter().copied().chain(moved).collect();
-    let sides = |f: &Face| [[f[0], f[1]], [f[1], f[2]], [f[2], f[0]]];
-    let mut edges: Vec<[u32; 2]> = faces.iter().flat_map(sides).collect();
-    edges.iter_mut().for_each(|e| e.sort_unstable());
-    edges.sort_unstable();
-    edges.dedup();
     let mut found = 0;
-    for edge in &edges {
+    for edge in &edges(&faces) {
         let e = edge.map(|v| all[v as usize]);
         for face in &faces {
             let is_obstacle = edge[0] >= cloth && face[0] >= cloth;

@@ -9,6 +9,7 @@ use super::report::StepReport;
 use super::state::{GarmentState, State};
 use super::workspace::Workspace;
 use tryon_geometry::math::V3;
+use tryon_geometry::math::order_statistics::percentile;
 use tryon_geometry::par;
 
 /// Percentage of vertices that are at most as fast as a garment. The rest, caught between layers, may never rest.
@@ -117,26 +118,5 @@ fn commit_garment<'a>(
             .unwrap_or(0.0)
             .sqrt(),
         strain: percentile(&mut strain, STRAIN_PERCENTILE).map(|p99| [p99, largest]),
-    }
-}
-
-/// Percentile of some values, which are reordered; `None` of nothing. NaN counts as largest.
-pub(super) fn percentile(of: &mut [f32], hundredths: usize) -> Option<f32> {
-    let at = (of.len() * hundredths / 100).min(of.len().checked_sub(1)?);
-    Some(*of.select_nth_unstable_by(at, f32::total_cmp).1)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn percentile_of_a_range_has_its_closed_form_and_of_nothing_none() {
-        let mut all: Vec<f32> = (0..200).rev().map(|i| i as f32).collect();
-        assert_eq!(percentile(&mut all, 95), Some(190.0));
-        assert_eq!(percentile(&mut all, 100), Some(199.0));
-        assert_eq!(percentile(&mut [3.0], 99), Some(3.0));
-        assert_eq!(percentile(&mut [], 99), None);
-        assert_eq!(percentile(&mut [f32::NAN, 1.0, 2.0], 34), Some(2.0));
     }
 }

@@ -1,13 +1,12 @@
 //! Parts of the multi-cloth template: faces of one garment, the body vertex of each of its vertices, and its boundary rings.
 
-use crate::face_edges::sides;
 use crate::segment::{BodyRegion, Labelling, Slot};
 use crate::topology::{ClothTemplate, LegTopology};
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, BTreeSet};
 use tryon_body::Template;
 use tryon_body::parts::BodySide;
-use tryon_geometry::mesh::Face;
+use tryon_geometry::mesh::{Face, UnionFind, boundary_edges, boundary_loops};
 
 /// Least number of faces of a piece; smaller ones are errors of the labels.
 pub(super) const LEAST_FACES: usize = 40;
@@ -149,28 +148,15 @@ impl ClothPart {
 
 /// Leaves out connected pieces with fewer than `least` faces.
 pub(super) fn drop_small_pieces(faces: &mut Vec<Face>, least: usize) {
-    let mut parent: BTreeMap<u32, u32> = BTreeMap::new();
-    fn root(parent: &mut BTreeMap<u32, u32>, v: u32) -> u32 {
-        let mut r = v;
-        while let Some(p) = parent.get(&r).filter(|p| **p != r) {
-            r = *p;
-        }
-        parent.insert(v, r);
-        r
-    }
+    let vertices = faces.iter().flatten().max().map_or(0, |v| *v as usize + 1);
+    let mut sets = UnionFind::new(vertices);
     for f in faces.iter() {
-        let a = root(&mut parent, f[0]);
-        for v in &f[1..] {
-            let b = root(&mut parent, *v);
-            parent.insert(b, a);
-        }
+        f[1..].iter().for_each(|v| sets.join(f[0], *v));
     }
-    let mut sizes: BTreeMap<u32, usize> = BTreeMap::new();
-    let roots: Vec<u32> = faces.iter().map(|f| root(&mut parent, f[0])).collect();
-    roots
-        .iter()
-        .for_each(|r| *sizes.entry(*r).or_default() += 1);
-    let mut keep = roots.iter().map(|r| sizes[r] >= least);
+    let mut sizes = vec![0usize; vertices];
+    let roots: Vec<usize> = faces.iter().map(|f| sets.root(f[0]) as usize).collect();
+    roots.iter().for_each(|r| sizes[*r] += 1);
+    let mut keep = roots.iter().map(|r| sizes[*r] >= least);
     faces.retain(|_| keep.next().unwrap_or(false));
 }
 
@@ -191,32 +177,6 @@ pub(super) fn drop_fans(faces: &mut Vec<Face>) {
         }
         faces.retain(|f| !f.iter().any(|v| pinched.contains(v)));
     }
-}
-
-/// Directed edges with one face.
-pub(super) fn boundary_edges(faces: &[Face]) -> Vec<[u32; 2]> {
-    let all: BTreeSet<[u32; 2]> = faces.iter().flat_map(sides).collect();
-    let open = |e: &&[u32; 2]| !all.contains(&[e[1], e[0]]);
-    all.iter().filter(open).copied().collect()
-}
-
-/// Closed loops of boundary edges.
-fn boundary_loops(faces: &[Face]) -> Vec<Vec<u32>> {
-    let mut next: BTreeMap<u32, u32> = boundary_edges(faces)
-        .into_iter()
-        .map(|[a, b]| (a, b))
-        .collect();
-    let mut loops = Vec::new();
-    while let Some((&first, _)) = next.iter().next() {
-        let mut ring = Vec::new();
-        let mut at = first;
-        while let Some(b) = next.remove(&at) {
-            ring.push(at);
-            at = b;
-        }
-        loops.push(ring);
-    }
-    loops
 }
 
 /// Name of a ring by the body below it.

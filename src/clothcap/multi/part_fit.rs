@@ -6,11 +6,10 @@ use crate::align::{
     ActiveVertices, EVEN_EDGE, FaceCache, QuadraticEnergy, QueryCounts, QueryPoints, QuerySurface,
     ScanNormal, Stencil, VertexCounts,
 };
-use crate::face_edges::{edges, neighbours};
 use crate::scan::BodyScan;
 use std::sync::Arc;
 use tryon_geometry::math::{P3, V3};
-use tryon_geometry::mesh::{Csr, face_normal};
+use tryon_geometry::mesh::{Csr, edges, face_normal};
 use tryon_geometry::spatial::{Bvh, PointTree, SurfacePoint};
 use tryon_tracking::registration::GemanMcClure;
 
@@ -152,7 +151,7 @@ impl PartFit {
     pub fn new(part: &ClothPart, rest: &[P3]) -> Result<Self, CaptureError> {
         let n = part.nodes.len();
         let edges = edges(&part.faces);
-        let neighbours = neighbours(n, &edges);
+        let neighbours = Csr::of_edges(n, &edges);
         let mut on_ring = vec![false; n];
         part.rings
             .iter()

@@ -1,11 +1,10 @@
 //! Trimming of a captured part into cloth that can be worn: narrow tabs cut off, hems smoothed, self-intersections removed.
 
-use super::part::{ClothPart, LEAST_FACES, boundary_edges, drop_fans, drop_small_pieces};
-use crate::face_edges::{edges, neighbours};
+use super::part::{ClothPart, LEAST_FACES, drop_fans, drop_small_pieces};
 use std::collections::BTreeSet;
 use tryon_geometry::math::P3;
 use tryon_geometry::mesh::smoothing::half_mean;
-use tryon_geometry::mesh::{Csr, Face, TriMesh};
+use tryon_geometry::mesh::{Csr, Face, TriMesh, boundary_edges, edges};
 use tryon_geometry::spatial::intersections;
 
 /// Rings of vertices that are taken off and put on again: tabs of twice as many rings (1 cm each) are cut off.
@@ -36,7 +35,7 @@ impl ClothPart {
 
 /// Faces that remain after [`OPENING`] rings are taken off at the boundary and put on again.
 fn opened(faces: &[Face], vertices: usize) -> Vec<Face> {
-    let around = neighbours(vertices, &edges(faces));
+    let around = Csr::of_edges(vertices, &edges(faces));
     let boundary: BTreeSet<u32> = boundary_edges(faces).into_iter().flatten().collect();
     let mut off: Vec<bool> = (0..vertices as u32)
         .map(|v| boundary.contains(&v))
@@ -82,8 +81,8 @@ impl Cloth {
         let mut hems = boundary_edges(&faces);
         hems.iter_mut().for_each(|e| e.sort_unstable());
         Self {
-            around: neighbours(x.len(), &edges(&faces)),
-            along: neighbours(x.len(), &hems),
+            around: Csr::of_edges(x.len(), &edges(&faces)),
+            along: Csr::of_edges(x.len(), &hems),
             faces,
             x,
         }

@@ -7,6 +7,7 @@ use super::prior::{BodyRegion, Slot};
 use crate::CaptureError;
 use crate::topology::{ClothTemplate, LegTopology};
 use nalgebra::Vector3;
+use tryon_geometry::math::order_statistics::medians;
 
 /// Least difference between the dyes of shoes and skin, light left out: bare feet have up to 0.11, shoes from 0.37.
 const LEAST_DYE: f64 = 0.2;
@@ -120,12 +121,7 @@ impl Labeller<'_> {
             .iter()
             .filter_map(|v| self.without_light(*v))
             .collect();
-        let median = |axis: usize| {
-            let mut all: Vec<f64> = colors.iter().map(|c| c[axis]).collect();
-            all.sort_unstable_by(f64::total_cmp);
-            all.get(all.len() / 2).copied()
-        };
-        Some(Vector3::new(median(0)?, median(1)?, median(2)?))
+        medians(&colors).map(Vector3::from)
     }
 
     /// Top and bottom of a labelling look alike.

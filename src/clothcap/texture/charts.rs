@@ -1,9 +1,8 @@
 //! Charts of a surface: connected faces that look along one axis, projected along it without overlap.
 
-use crate::face_edges::sides;
 use std::collections::BTreeMap;
 use tryon_geometry::math::{P3, V3};
-use tryon_geometry::mesh::{Csr, Face, face_normal};
+use tryon_geometry::mesh::{Csr, Face, edge_faces, face_normal};
 
 /// Axes of projection: garments at rest face +z and stand along +y.
 const AXES: [[f32; 3]; 6] = [
@@ -70,16 +69,10 @@ pub(super) fn charts(vertices: &[P3], faces: &[Face]) -> Vec<Chart> {
 
 /// Neighbours of each face across its sides.
 fn face_neighbours(faces: &[Face]) -> Csr {
-    let mut of_edge: BTreeMap<[u32; 2], Vec<u32>> = BTreeMap::new();
-    for (f, face) in (0..).zip(faces) {
-        for [a, b] in sides(face) {
-            of_edge.entry([a.min(b), a.max(b)]).or_default().push(f);
-        }
-    }
     let mut pairs = Vec::new();
-    for beside in of_edge.values() {
-        for (i, a) in beside.iter().enumerate() {
-            for b in &beside[i + 1..] {
+    for beside in edge_faces(faces).chunk_by(|a, b| a.0 == b.0) {
+        for (i, (_, a)) in beside.iter().enumerate() {
+            for (_, b) in &beside[i + 1..] {
                 pairs.extend([(*a, *b), (*b, *a)]);
             }
         }
@@ -120,7 +113,11 @@ fn smoothed_axes(normals: &[V3], around: &Csr) -> Vec<usize> {
 /// Connected faces of each axis, in the order of their first faces.
 fn components(axes: &[usize], around: &Csr) -> Vec<(usize, Vec<u32>)> {
     let all = around.components(|f, g| axes[f] == axes[g]).into_iter();
-    all.map(|own| (axes[own[0] as usize], own)).collect()
+    let ascending = |mut own: Vec<u32>| {
+        own.sort_unstable();
+        (axes[own[0] as usize], own)
+    };
+    all.map(ascending).collect()
 }
 
 /// Gives the faces of small charts to their neighbours.

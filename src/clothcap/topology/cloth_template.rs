@@ -9,7 +9,7 @@ use std::sync::Arc;
 use tryon_body::parts::BodySide;
 use tryon_body::{BodyError, ShapeSpace, SkinWeights, Template};
 use tryon_geometry::math::{P3, V3};
-use tryon_geometry::mesh::{Face, TriMesh};
+use tryon_geometry::mesh::{Face, TriMesh, sides, undirected};
 
 /// Edges across the tube, metres.
 const SPACING: f32 = 0.02;
@@ -167,11 +167,10 @@ fn keep_open(body: &Template, gone: &[bool], line: &mut Vec<u32>) {
 /// Membership of each face of a body in the region between its legs, which the lines enclose.
 fn inner_faces(body: &Template, crotch: &Crotch, lines: &[&[Vec<u32>; 2]]) -> Vec<bool> {
     let (vertices, faces) = (body.mesh().vertices(), body.mesh().faces());
-    let key = |a: u32, b: u32| [a.min(b), a.max(b)];
     let walls: BTreeSet<[u32; 2]> = lines
         .iter()
         .flat_map(|sides| sides.iter().flat_map(|line| line.windows(2)))
-        .map(|e| key(e[0], e[1]))
+        .map(|e| undirected([e[0], e[1]]))
         .collect();
     // The lines end a little above or below their height.
     let lowest = crotch.end + SPACING;
@@ -198,9 +197,8 @@ fn inner_faces(body: &Template, crotch: &Crotch, lines: &[&[Vec<u32>; 2]]) -> Ve
             continue;
         }
         gone[f as usize] = true;
-        let [a, b, c] = faces[f as usize];
-        for [p, q] in [[a, b], [b, c], [c, a]] {
-            if walls.contains(&key(p, q)) {
+        for [p, q] in sides(&faces[f as usize]) {
+            if walls.contains(&undirected([p, q])) {
                 continue;
             }
             let across = around.row(p as usize).iter();

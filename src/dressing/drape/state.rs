@@ -9,6 +9,7 @@ use tryon_cloth::sleeve_rings::Sleeve;
 use tryon_cloth::untangler::Untangler;
 use tryon_cloth::{Hinge, Sheet};
 use tryon_garment::{GarmentError, GarmentMesh, Region};
+use tryon_geometry::math::order_statistics::percentile;
 use tryon_geometry::math::{P3, V3d};
 use tryon_geometry::mesh::distances;
 
@@ -148,10 +149,7 @@ impl Drape {
             (a - b).norm() / e.rest - 1.0
         };
         let mut all: Vec<f64> = self.edges.iter().map(stretch).collect();
-        all.sort_unstable_by(f64::total_cmp);
-        let rank = (all.len() as f64 * 0.99) as usize;
-        let p99 = all.get(rank.min(all.len().saturating_sub(1))).copied();
-        (deepest, p99.unwrap_or(0.0))
+        (deepest, percentile(&mut all, 99).unwrap_or(0.0))
     }
 }
 

@@ -2,7 +2,6 @@
 
 use crate::file_frame::bounds;
 use crate::skin_binding::SkinBinding;
-use std::collections::{BTreeMap, BTreeSet};
 use tryon_body::Template;
 use tryon_body::parts::vertex_masks;
 use tryon_formats::sewn_obj::SewnObj;
@@ -109,7 +108,8 @@ impl<'a> PieceClassifier<'a> {
             let (lo, hi) = bounds(l.iter().map(|v| &x[*v as usize]));
             (hi - lo).norm()
         };
-        let openings: Vec<Vec<u32>> = boundary_loops(topology)
+        let openings: Vec<Vec<u32>> = topology
+            .boundary_components()
             .into_iter()
             .filter(|l| diameter(l) > OPENING)
             .collect();
@@ -141,29 +141,4 @@ impl<'a> PieceClassifier<'a> {
             has_legs,
         }
     }
-}
-
-/// Vertices of each connected set of boundary edges.
-fn boundary_loops(t: &Topology) -> Vec<Vec<u32>> {
-    let mut next: BTreeMap<u32, Vec<u32>> = BTreeMap::new();
-    for e in t.edges().iter().filter(|e| e.twin.is_none()) {
-        next.entry(e.v[0]).or_default().push(e.v[1]);
-        next.entry(e.v[1]).or_default().push(e.v[0]);
-    }
-    let mut seen = BTreeSet::new();
-    let mut out = Vec::new();
-    for &start in next.keys() {
-        if seen.contains(&start) {
-            continue;
-        }
-        let (mut chain, mut stack) = (Vec::new(), vec![start]);
-        while let Some(v) = stack.pop() {
-            if seen.insert(v) {
-                chain.push(v);
-                stack.extend(&next[&v]);
-            }
-        }
-        out.push(chain);
-    }
-    out
 }

@@ -5,7 +5,8 @@
 use crate::{GarmentMesh, RenderMesh};
 use std::collections::{BTreeMap, BTreeSet};
 use tryon_geometry::math::P3;
-use tryon_geometry::mesh::Face;
+use tryon_geometry::math::order_statistics::median;
+use tryon_geometry::mesh::{Face, sides, undirected};
 
 /// Edges shorter than this times the target are collapsed (Botsch & Kobbelt 2004).
 const COLLAPSE: f64 = 4.0 / 5.0;
@@ -180,13 +181,9 @@ impl Coarsener {
 
 /// Median length of the edges at rest, metres.
 pub fn median_edge(g: &GarmentMesh) -> f64 {
-    let mut l: Vec<f64> = g
-        .rest
-        .iter()
-        .flat_map(|t| (0..3).map(|k| length(sub(t[(k + 1) % 3], t[k]))))
-        .collect();
-    l.sort_unstable_by(f64::total_cmp);
-    l.get(l.len() / 2).copied().unwrap_or(0.0)
+    let lengths = |t: &[[f64; 2]; 3]| [0, 1, 2].map(|k| length(sub(t[(k + 1) % 3], t[k])));
+    let mut all: Vec<f64> = g.rest.iter().flat_map(lengths).collect();
+    median(&mut all).unwrap_or(0.0)
 }
 
 /// The same panels and seams on some of the vertices, with edges of about `target` metres at rest; and their positions.
@@ -272,20 +269,20 @@ fn rebuilt(g: &GarmentMesh, positions: &[P3], c: &Coarsener) -> (GarmentMesh, Ve
         faces: kept.iter().map(|k| k.2.map(|l| loose[&l])).collect(),
     };
     // Seams: edges between two faces that have no panel's edge in common.
+    let edges = |f: &Face| sides(f).map(undirected);
     let (mut in_panels, mut in_all) = (BTreeMap::new(), BTreeMap::new());
     for (f, l) in out.faces.iter().zip(&out.render.faces) {
-        for k in 0..3 {
-            let pair = |f: &Face| (f[k].min(f[(k + 1) % 3]), f[k].max(f[(k + 1) % 3]));
-            *in_all.entry(pair(f)).or_insert(0) += 1;
-            in_panels.entry(pair(l)).or_insert((0, pair(f))).0 += 1;
+        for (edge, loose) in edges(f).into_iter().zip(edges(l)) {
+            *in_all.entry(edge).or_insert(0) += 1;
+            in_panels.entry(loose).or_insert((0, edge)).0 += 1;
         }
     }
-    let seams: BTreeSet<(u32, u32)> = in_panels
+    let seams: BTreeSet<[u32; 2]> = in_panels
         .values()
         .filter(|(n, e)| *n == 1 && in_all[e] == 2)
         .map(|(_, e)| *e)
         .collect();
-    out.seams = seams.into_iter().map(|(a, b)| [a, b]).collect();
+    out.seams = seams.into_iter().collect();
     out.min_angle = out
         .rest
         .iter()

@@ -1,6 +1,5 @@
 //! Mesh files as surfaces of cloth: OBJ with or without stitches, glTF, MakeHuman clothes.
 
-use crate::union_find::UnionFind;
 use std::collections::BTreeMap;
 use std::path::Path;
 use tryon_formats::FormatError;
@@ -9,7 +8,7 @@ use tryon_formats::mhclo::read_mhclo;
 use tryon_formats::obj::{ObjMesh, read_obj};
 use tryon_formats::sewn_obj::{SewnObj, Stitch, read_sewn_obj};
 use tryon_geometry::math::P3;
-use tryon_geometry::mesh::{Face, TriMesh};
+use tryon_geometry::mesh::{Face, TriMesh, UnionFind, edge_faces, sides, undirected};
 
 /// Surface of a mesh file.
 #[derive(Clone, Debug, PartialEq)]
@@ -140,17 +139,11 @@ fn welded(model: GltfModel, path: &Path) -> Result<ObjMesh, FormatError> {
 /// Reverses faces until neighbours have the same orientation; returns the number of reversed faces.
 fn orient(o: &mut ObjMesh, path: &Path) -> Result<usize, FormatError> {
     let mut faces = o.mesh.faces().to_vec();
-    let mut around: BTreeMap<(u32, u32), Vec<u32>> = BTreeMap::new();
-    for (i, f) in faces.iter().enumerate() {
-        for k in 0..3 {
-            let (a, b) = (f[k], f[(k + 1) % 3]);
-            around
-                .entry((a.min(b), a.max(b)))
-                .or_default()
-                .push(i as u32);
-        }
+    let mut around: BTreeMap<[u32; 2], Vec<u32>> = BTreeMap::new();
+    for (edge, face) in edge_faces(&faces) {
+        around.entry(edge).or_default().push(face);
     }
-    if let Some(((a, b), f)) = around.iter().find(|(_, f)| f.len() > 2) {
+    if let Some(([a, b], f)) = around.iter().find(|(_, f)| f.len() > 2) {
         let why = format!(
             "{} faces meet there ({:?}); cloth has at most two",
             f.len(),
@@ -158,7 +151,6 @@ fn orient(o: &mut ObjMesh, path: &Path) -> Result<usize, FormatError> {
         );
         return Err(FormatError::field(path, format!("edge ({a}, {b})"), why));
     }
-    let runs = |f: &Face, a: u32, b: u32| (0..3).any(|k| f[k] == a && f[(k + 1) % 3] == b);
     let mut known = vec![false; faces.len()];
     let mut turned = vec![false; faces.len()];
     for seed in 0..faces.len() {
@@ -170,15 +162,15 @@ fn orient(o: &mut ObjMesh, path: &Path) -> Result<usize, FormatError> {
             let i = piece[at];
             at += 1;
             let f = faces[i];
-            for k in 0..3 {
-                let (a, b) = (f[k], f[(k + 1) % 3]);
-                for &n in &around[&(a.min(b), a.max(b))] {
+            for side in sides(&f) {
+                for &n in &around[&undirected(side)] {
                     let n = n as usize;
                     // Faces of the same orientation run along their edge in opposite directions.
-                    let alike = n == i || !runs(&faces[n], a, b);
+                    let alike = n == i || !sides(&faces[n]).contains(&side);
                     if known[n] && !alike {
                         let why = "its faces cannot be turned alike: the surface has one side only"
                             .to_owned();
+                        let [a, b] = side;
                         return Err(FormatError::field(path, format!("edge ({a}, {b})"), why));
                     }
                     if !std::mem::replace(&mut known[n], true) {

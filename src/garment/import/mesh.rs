@@ -1,12 +1,12 @@
 //! Mesh garments: rest shape from texture coordinates in metres, or from the triangles in space.
 
 use crate::flat_triangle::{rest_area, smallest_angle, unfold};
-use crate::union_find::UnionFind;
 use crate::{GarmentError, GarmentKind, GarmentMesh, Material, Region, RenderMesh, Size};
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 use tryon_formats::sewn_obj::{SewnObj, Stitch};
 use tryon_geometry::math::P3;
-use tryon_geometry::mesh::{Face, Topology, TriMesh};
+use tryon_geometry::math::order_statistics::percentile;
+use tryon_geometry::mesh::{Face, Topology, TriMesh, UnionFind, sides};
 
 /// Garment from a mesh, with the positions of its vertices in the file.
 #[derive(Clone, Debug, PartialEq)]
@@ -184,12 +184,7 @@ fn flat_rest(sewn: &SewnObj) -> Option<Vec<[[f64; 2]; 3]>> {
                 / (p[1] - p[0]).norm().max(f64::MIN_POSITIVE)
         })
         .collect();
-    ratio.sort_by(f64::total_cmp);
-    let at = |share: usize| {
-        ratio
-            .get(ratio.len() * share / 100)
-            .map(|r| (r - 1.0).abs())
-    };
+    let mut at = |share| percentile(&mut ratio, share).map(|r| (r - 1.0).abs());
     (at(50)? < SAME_SCALE && at(25)? < ISOMETRIC && at(75)? < ISOMETRIC).then_some(rest)
 }
 
@@ -247,15 +242,11 @@ impl Weld {
     }
     /// Ends of edges that are used twice in one direction.
     fn improper(&self, faces: &[Face]) -> BTreeSet<u32> {
-        let mut uses: BTreeMap<(u32, u32), [u32; 2]> = BTreeMap::new();
-        for w in faces.iter().filter_map(|f| self.face(f)) {
-            for k in 0..3 {
-                let (a, b) = (w[k], w[(k + 1) % 3]);
-                uses.entry((a.min(b), a.max(b))).or_default()[usize::from(a < b)] += 1;
-            }
-        }
-        let improper = uses.iter().filter(|(_, u)| u[0] > 1 || u[1] > 1);
-        improper.flat_map(|((a, b), _)| [*a, *b]).collect()
+        let welded = faces.iter().filter_map(|f| self.face(f));
+        let mut all: Vec<[u32; 2]> = welded.flat_map(|f| sides(&f)).collect();
+        all.sort_unstable();
+        let repeated = all.windows(2).filter(|w| w[0] == w[1]);
+        repeated.flat_map(|w| w[0]).collect()
     }
     /// Mean position of the vertices of each welded vertex, metres.
     fn positions(&self, vertices: &[P3]) -> Vec<P3> {

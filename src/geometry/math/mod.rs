@@ -4,6 +4,7 @@ pub mod derivative_check;
 mod element_energy;
 mod frames;
 mod lie;
+pub mod order_statistics;
 mod polar;
 mod symmetric;
 

@@ -1,6 +1,6 @@
 //! A triangle mesh under local edits: faces by vertex, edge split, edge collapse, edge flip.
 
-use super::Face;
+use super::{Face, edges};
 use crate::math::{P3d, V3d};
 
 /// Positions, faces (`None` once removed) and the faces around each vertex.
@@ -62,16 +62,9 @@ impl EditableMesh {
             .iter()
             .filter_map(|f| self.faces[*f as usize])
     }
-    /// Edges as (smaller, larger), sorted.
-    pub(super) fn edges(&self) -> Vec<(u32, u32)> {
-        let pairs = |f: &Face| {
-            let f = *f;
-            (0..3).map(move |k| (f[k].min(f[(k + 1) % 3]), f[k].max(f[(k + 1) % 3])))
-        };
-        let mut edges: Vec<_> = self.faces.iter().flatten().flat_map(pairs).collect();
-        edges.sort_unstable();
-        edges.dedup();
-        edges
+    /// Edges, smaller vertex first, ascending.
+    pub(super) fn edges(&self) -> Vec<[u32; 2]> {
+        edges(&self.faces.iter().flatten().copied().collect::<Vec<_>>())
     }
     /// Faces with both vertices.
     pub(super) fn edge_faces(&self, a: u32, b: u32) -> Vec<u32> {
@@ -89,7 +82,7 @@ impl EditableMesh {
     /// Vertices on edges with one face, shape `[vertices]`.
     pub(super) fn open_vertices(&self) -> Vec<bool> {
         let mut open = vec![false; self.points.len()];
-        for (a, b) in self.edges() {
+        for [a, b] in self.edges() {
             if self.edge_faces(a, b).len() == 1 {
                 open[a as usize] = true;
                 open[b as usize] = true;

@@ -1,17 +1,21 @@
 //! Triangle meshes and their topology, checked once at construction; normals, boundaries, isotropic remeshing, neighbour smoothing.
 
 mod distances;
+mod edges;
 mod editable;
 mod normals;
 mod remesh;
 pub mod smoothing;
 mod topology;
+mod union_find;
 
 pub use distances::distances;
+pub use edges::{boundary_edges, boundary_loops, edge_faces, edges, sides, undirected};
 pub use editable::smallest_angle;
 pub use normals::{face_normal, vertex_normal, vertex_normals};
 pub use remesh::{Border, RemeshSpec, Remesher, remesh};
 pub use topology::{Csr, Edge, Topology};
+pub use union_find::UnionFind;
 
 use crate::math::P3;
 use serde::{Deserialize, Serialize};

@@ -101,12 +101,12 @@ impl<'a> Remesher<'a> {
     }
 
     /// Edges whose stretch is `wanted`, shortest first.
-    fn by_stretch(&self, wanted: impl Fn(f64) -> bool) -> Vec<(u32, u32)> {
-        let mut edges: Vec<(f64, (u32, u32))> = self
+    fn by_stretch(&self, wanted: impl Fn(f64) -> bool) -> Vec<[u32; 2]> {
+        let mut edges: Vec<(f64, [u32; 2])> = self
             .mesh
             .edges()
             .into_iter()
-            .map(|e| (self.stretch(e.0, e.1), e))
+            .map(|e| (self.stretch(e[0], e[1]), e))
             .filter(|e| wanted(e.0))
             .collect();
         edges.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
@@ -115,7 +115,7 @@ impl<'a> Remesher<'a> {
 
     /// Splits long edges in the middle, the longest first.
     pub fn split(&mut self) {
-        for (a, b) in self.by_stretch(|s| s > SPLIT).into_iter().rev() {
+        for [a, b] in self.by_stretch(|s| s > SPLIT).into_iter().rev() {
             let open = self.mesh.edge_faces(a, b).len() == 1;
             let [p, q] = [a, b].map(|v| self.mesh.points[v as usize]);
             let mut middle = nalgebra::center(&p, &q);
@@ -136,7 +136,7 @@ impl<'a> Remesher<'a> {
 
     /// Collapses short edges, the shortest first.
     pub fn collapse(&mut self) {
-        for (a, b) in self.by_stretch(|s| s < COLLAPSE) {
+        for [a, b] in self.by_stretch(|s| s < COLLAPSE) {
             let shared = self.mesh.edge_faces(a, b);
             if shared.is_empty() || self.stretch(a, b) >= COLLAPSE {
                 continue;
@@ -212,7 +212,7 @@ impl<'a> Remesher<'a> {
 
     /// Flips edges where that brings valences nearer to the ideal, or mends a poor angle.
     pub fn flip(&mut self) {
-        for (a, b) in self.mesh.edges() {
+        for [a, b] in self.mesh.edges() {
             if let Some(flipped) = self.mesh.flipped(a, b).filter(|f| self.improves((a, b), f)) {
                 for (face, new) in flipped.faces.into_iter().zip(flipped.after) {
                     self.mesh.put(face, Some(new));

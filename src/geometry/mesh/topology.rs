@@ -39,28 +39,27 @@ impl<T: Copy + Default> Csr<T> {
 }
 
 impl Csr {
-    /// Connected rows whose neighbours are `alike`, each ascending, in the order of their first rows.
+    /// Neighbours of each of `rows` rows along undirected edges, in the order of `edges`.
+    pub fn of_edges(rows: usize, edges: &[[u32; 2]]) -> Self {
+        let both = |[a, b]: &[u32; 2]| [(*a, *b), (*b, *a)];
+        Self::from_pairs(rows, &edges.iter().flat_map(both).collect::<Vec<_>>())
+    }
+    /// Connected rows whose neighbours are `alike`, each depth-first from its first row, in the order of their first rows.
     pub fn components(&self, alike: impl Fn(usize, usize) -> bool) -> Vec<Vec<u32>> {
         let mut is_taken = vec![false; self.rows()];
         let mut out = Vec::new();
-        for first in 0..self.rows() {
-            if std::mem::replace(&mut is_taken[first], true) {
-                continue;
-            }
-            let mut own = vec![first as u32];
-            let mut next = 0;
-            while let Some(v) = own.get(next).map(|v| *v as usize) {
-                next += 1;
-                for w in self.row(v) {
-                    let taken = &mut is_taken[*w as usize];
-                    if !*taken && alike(v, *w as usize) {
-                        *taken = true;
-                        own.push(*w);
-                    }
+        for first in 0..self.rows() as u32 {
+            let (mut own, mut stack) = (Vec::new(), vec![first]);
+            while let Some(v) = stack.pop() {
+                if !std::mem::replace(&mut is_taken[v as usize], true) {
+                    own.push(v);
+                    let near = self.row(v as usize).iter();
+                    stack.extend(near.filter(|w| alike(v as usize, **w as usize)));
                 }
             }
-            own.sort_unstable();
-            out.push(own);
+            if !own.is_empty() {
+                out.push(own);
+            }
         }
         out
     }
@@ -144,14 +143,11 @@ impl Topology {
             .enumerate()
             .flat_map(|(fi, f)| f.map(|v| (v, fi as u32)))
             .collect();
-        let vn: Vec<(u32, u32)> = edges
-            .iter()
-            .flat_map(|e| [(e.v[0], e.v[1]), (e.v[1], e.v[0])])
-            .collect();
+        let ends: Vec<[u32; 2]> = edges.iter().map(|e| e.v).collect();
         Ok(Self {
             edges,
             vertex_faces: Csr::from_pairs(n, &vf),
-            vertex_neighbours: Csr::from_pairs(n, &vn),
+            vertex_neighbours: Csr::of_edges(n, &ends),
         })
     }
     /// All edges.
@@ -170,38 +166,32 @@ impl Topology {
     pub fn is_closed(&self) -> bool {
         self.edges.iter().all(|e| e.twin.is_some())
     }
+    fn boundary_edges(&self) -> impl Iterator<Item = [u32; 2]> {
+        let open = self.edges.iter().filter(|e| e.twin.is_none());
+        open.map(|e| e.v)
+    }
     /// Membership in a boundary edge of each vertex, shape `[vertices]`.
     pub fn boundary_vertices(&self) -> Vec<bool> {
         let mut on = vec![false; self.vertex_faces.rows()];
-        for e in self.edges.iter().filter(|e| e.twin.is_none()) {
-            on[e.v[0] as usize] = true;
-            on[e.v[1] as usize] = true;
-        }
+        let ends = self.boundary_edges().flatten();
+        ends.for_each(|v| on[v as usize] = true);
         on
+    }
+    /// Vertices of each connected set of boundary edges, depth-first from the first.
+    pub fn boundary_components(&self) -> Vec<Vec<u32>> {
+        let edges: Vec<[u32; 2]> = self.boundary_edges().collect();
+        let mut all = Csr::of_edges(self.vertex_faces.rows(), &edges).components(|_, _| true);
+        all.retain(|own| own.len() > 1);
+        all
     }
     /// Connected component of each vertex, numbered from 0 in order of first vertex, and their count.
     pub fn components(&self) -> (Vec<u32>, usize) {
-        let n = self.vertex_faces.rows();
-        let mut label = vec![u32::MAX; n];
-        let mut count = 0;
-        let mut stack = Vec::new();
-        for seed in 0..n {
-            if label[seed] != u32::MAX {
-                continue;
-            }
-            label[seed] = count;
-            stack.push(seed as u32);
-            while let Some(v) = stack.pop() {
-                for &w in self.vertex_neighbours.row(v as usize) {
-                    if label[w as usize] == u32::MAX {
-                        label[w as usize] = count;
-                        stack.push(w);
-                    }
-                }
-            }
-            count += 1;
+        let all = self.vertex_neighbours.components(|_, _| true);
+        let mut label = vec![0; self.vertex_faces.rows()];
+        for (own, n) in all.iter().zip(0..) {
+            own.iter().for_each(|v| label[*v as usize] = n);
         }
-        (label, count as usize)
+        (label, all.len())
     }
 }
 
@@ -212,8 +202,7 @@ mod tests {
 
     #[test]
     fn components_are_connected_rows_that_are_alike() {
-        let pairs = [(0, 1), (1, 0), (1, 2), (2, 1), (3, 4), (4, 3)];
-        let csr = Csr::from_pairs(5, &pairs);
+        let csr = Csr::of_edges(5, &[[0, 1], [1, 2], [3, 4]]);
         assert_eq!(csr.components(|_, _| true), [vec![0, 1, 2], vec![3, 4]]);
         let split = csr.components(|a, b| (a < 2) == (b < 2));
         assert_eq!(split, [vec![0, 1], vec![2], vec![3, 4]]);
@@ -239,6 +228,8 @@ mod tests {
         assert_eq!((hinge.v, hinge.face, hinge.twin), ([1, 2], 0, Some(1)));
         assert_eq!(hinge.opposite, [Some(0), Some(3)]);
         assert!(!t.is_closed() && t.boundary_vertices().iter().all(|b| *b));
+        assert_eq!(t.boundary_components(), [[0, 2, 3, 1]]);
+        assert_eq!(t.components(), (vec![0; 4], 1));
         let flipped = TriMesh::new(v.clone(), vec![[0, 1, 2], [1, 2, 3]]).expect("valid");
         assert_eq!(
             Topology::new(&flipped).err(),

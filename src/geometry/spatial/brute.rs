@@ -23,7 +23,7 @@ pub(in crate::spatial) use meshes::*;
 mod meshes {
     use super::P3;
     use crate::math::V3d;
-    use crate::mesh::Face;
+    use crate::mesh::{Face, edges};
     use crate::spatial::triangle::{closest_on_triangle, passes_through, ray_crossing};
 
     /// Winding number by the crossings of a ray with every triangle.
@@ -73,14 +73,8 @@ mod meshes {
 
     /// Every edge against every triangle without a common corner: edges by their ends, and triangles.
     pub(in crate::spatial) fn intersections(faces: &[Face], x: &[V3d]) -> Vec<([u32; 2], u32)> {
-        let mut edges: Vec<[u32; 2]> = faces
-            .iter()
-            .flat_map(|f| [(0, 1), (1, 2), (2, 0)].map(|(i, j)| [f[i].min(f[j]), f[i].max(f[j])]))
-            .collect();
-        edges.sort_unstable();
-        edges.dedup();
         let mut found = Vec::new();
-        for e in edges {
+        for e in edges(faces) {
             for (n, f) in (0u32..).zip(faces) {
                 let shared = f.iter().any(|v| e.contains(v));
                 if !shared && passes_through(&e.map(|v| x[v as usize]), &f.map(|v| x[v as usize])) {

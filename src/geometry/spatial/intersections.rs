@@ -4,7 +4,7 @@ use super::Bvh;
 use super::bvh::{Bounds, LEAF, NONE};
 use super::triangle::passes_through;
 use crate::math::{P3, V3d};
-use crate::mesh::Face;
+use crate::mesh::{Face, edge_faces};
 use crate::par::{self, Par};
 
 /// An edge that passes through a triangle of the same mesh.
@@ -46,25 +46,13 @@ pub struct SelfIntersections {
 impl SelfIntersections {
     /// Prepares triangles at `x` (metres); they may move freely afterwards.
     pub fn new(faces: &[Face], x: &[V3d]) -> Self {
-        let mut sides: Vec<([u32; 2], u32)> = faces
-            .iter()
-            .enumerate()
-            .flat_map(|(n, f)| {
-                [(0, 1), (1, 2), (2, 0)].map(|(i, j)| ([f[i].min(f[j]), f[i].max(f[j])], n as u32))
-            })
-            .collect();
-        sides.sort_unstable();
-        let (mut edges, mut edge_faces): (Vec<[u32; 2]>, Vec<[u32; 2]>) = (Vec::new(), Vec::new());
-        for (e, f) in sides {
-            match edge_faces.last_mut() {
-                Some(b) if edges.last() == Some(&e) => b[1] = f,
-                _ => {
-                    edges.push(e);
-                    edge_faces.push([f, NONE]);
-                }
-            }
+        let (mut edges, mut beside) = (Vec::new(), Vec::new());
+        for of_edge in edge_faces(faces).chunk_by(|a, b| a.0 == b.0) {
+            let (first, others) = (of_edge[0].1, &of_edge[1..]);
+            edges.push(of_edge[0].0);
+            beside.push([first, others.last().map_or(NONE, |(_, f)| *f)]);
         }
-        Self::with_edges(faces, edges, edge_faces, x)
+        Self::with_edges(faces, edges, beside, x)
     }
 
     /// The triangles that `wanted` accepts as a mesh of their own, and the indices of its edges and triangles here.

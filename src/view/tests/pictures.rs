@@ -3,6 +3,7 @@
 use super::fixture::{Scenery, draw};
 use crate::{Config, GarmentView, Margins, Model, RenderError, State, Workspace, render};
 use tryon_geometry::math::P3;
+use tryon_geometry::math::order_statistics::median;
 use tryon_geometry::mesh::{Face, face_normal};
 use tryon_geometry::par::{self, Par};
 
@@ -226,15 +227,11 @@ fn biases_order_garments_and_leave_their_depths() {
         let covered = work.pixels.iter().filter(|p| p.covered == 9);
         covered.map(|p| p.depth).collect()
     };
-    let alone = depths(&[shirt]);
+    let mut alone = depths(&[shirt]);
     assert!(alone.len() > 3000);
-    let median = |mut z: Vec<f32>| {
-        let middle = z.len() / 2;
-        *z.select_nth_unstable_by(middle, f32::total_cmp).1
-    };
-    let expected = median(alone);
+    let expected = median(&mut alone).expect("pixels");
     for garments in [vec![under, under, under, shirt], vec![turned]] {
-        let got = median(depths(&garments));
+        let got = median(&mut depths(&garments)).expect("pixels");
         assert!(
             (got - expected).abs() < 5e-4,
             "{got} instead of {expected} m"

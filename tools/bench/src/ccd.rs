@@ -7,6 +7,7 @@ use std::time::Instant;
 use tryon_cloth::contact::ccd::{PairKind, PairMotion, has_impact, time_of_impact};
 use tryon_formats::FormatError;
 use tryon_formats::ccd_queries::{CcdQuery, CcdQuerySet, find_ccd_queries, read_ccd_queries};
+use tryon_geometry::math::order_statistics::median;
 
 /// Calls timed together: one call is as short as reading the clock.
 const CALLS: u32 = 8;
@@ -171,12 +172,11 @@ impl AnswerTally {
     }
 
     fn answers(&self) -> CcdAnswers {
-        let mut times = self.nanoseconds.clone();
-        times.sort_unstable_by(f64::total_cmp);
+        let times = &self.nanoseconds;
         CcdAnswers {
             missed: self.missed,
             false_alarms: self.false_alarms,
-            median_ns: times.get(times.len() / 2).copied().unwrap_or(0.0),
+            median_ns: median(&mut times.clone()).unwrap_or(0.0),
             mean_ns: times.iter().sum::<f64>() / times.len().max(1) as f64,
         }
     }

@@ -9,6 +9,7 @@ use tryon_cloth::fine::{
 };
 use tryon_cloth::scene::{Scene, load};
 use tryon_geometry::math::P3;
+use tryon_geometry::math::order_statistics::median;
 use tryon_geometry::par::Par;
 
 /// Scenes and extent of the comparison.
@@ -164,9 +165,7 @@ impl Run {
 
     /// Row without the distances from a reference.
     fn row(&self, scene: &str, variant: Variant) -> Row {
-        let mut seconds = self.seconds.clone();
-        seconds.sort_unstable_by(f64::total_cmp);
-        let median = seconds.get(seconds.len() / 2).copied().unwrap_or(f64::NAN);
+        let median = median(&mut self.seconds.clone()).unwrap_or(f64::NAN);
         let sum = |count: fn(&OfflineFrameReport) -> usize| -> usize {
             self.work.iter().map(count).sum()
         };

@@ -9,6 +9,7 @@ use std::time::Instant;
 use tryon_body::{BodyShape, Pose, RestBody, Template, measure};
 use tryon_cloth::{Input, State, Workspace, step};
 use tryon_dressing::{Dressed, rig_standing, suggest};
+use tryon_geometry::math::order_statistics::{median, percentile};
 use tryon_geometry::math::{Body, P3, Rigid, World};
 use tryon_geometry::mesh::Face;
 
@@ -57,7 +58,7 @@ pub struct DanceReport {
 impl DanceReport {
     /// Median run time of a step (ms).
     pub fn median_ms(&self) -> f64 {
-        percentile(&mut self.ms.clone(), 0.5)
+        median(&mut self.ms.clone()).unwrap_or(0.0)
     }
     /// Row of a benchmark.
     pub fn row(&self, method: &str) -> Row {
@@ -68,14 +69,6 @@ impl DanceReport {
             .error("p99_penetration_mm", mm(self.penetration[0]))
             .error("max_penetration_mm", mm(self.penetration[1]))
     }
-}
-
-fn percentile(values: &mut [f64], share: f64) -> f64 {
-    values.sort_unstable_by(f64::total_cmp);
-    values
-        .get(((values.len() as f64 * share) as usize).min(values.len().saturating_sub(1)))
-        .copied()
-        .unwrap_or(0.0)
 }
 
 /// Reads the dance and fits a skeleton to its body: the embedded template is tracked onto a rendering of it.
@@ -173,9 +166,10 @@ impl Dance {
             }
             frame(time, &body, &dressed);
         }
-        report.p99_strain = percentile(&mut strain, 0.99);
-        report.penetration = [percentile(&mut depths, 0.99), percentile(&mut depths, 1.0)];
-        report.penetration_single = [percentile(&mut single, 0.99), percentile(&mut single, 1.0)];
+        report.p99_strain = percentile(&mut strain, 99).unwrap_or(0.0);
+        let ends = |all: &mut [f64]| [99, 100].map(|p| percentile(all, p).unwrap_or(0.0));
+        report.penetration = ends(&mut depths);
+        report.penetration_single = ends(&mut single);
         Ok(report)
     }
 }

@@ -2,6 +2,7 @@
 
 use std::fmt::Write;
 use std::time::Instant;
+use tryon_geometry::math::order_statistics::{median, percentile};
 use tryon_synth::labelled::{LabelledFrame, LabelledFrames, NO_CLASS};
 use tryon_tracking::part_classes::{PART_CLASSES, PartKind, class_name, kind_of};
 use tryon_tracking::segment::part_forest::{PartForest, PartScratch};
@@ -146,18 +147,16 @@ impl PartScores {
     /// Median and greatest time of a frame, milliseconds.
     pub fn time(&self) -> [f64; 2] {
         let mut ms = self.ms.clone();
-        ms.sort_by(f64::total_cmp);
-        [ms.len() / 2, ms.len().saturating_sub(1)].map(|k| ms.get(k).copied().unwrap_or(0.0))
+        [50, 100].map(|p| percentile(&mut ms, p).unwrap_or(0.0))
     }
     /// Median error of the facing in a sector, degrees, and share of errors beyond a quarter turn.
     pub fn facing_of(&self, sector: usize) -> [f64; 2] {
         let mut e = self.facing[sector].clone();
-        e.sort_by(f64::total_cmp);
         let beyond = e
             .iter()
             .filter(|x| **x > std::f64::consts::FRAC_PI_2)
             .count();
-        let median = e.get(e.len() / 2).copied().unwrap_or(0.0);
+        let median = median(&mut e).unwrap_or(0.0);
         [median.to_degrees(), beyond as f64 / e.len().max(1) as f64]
     }
 

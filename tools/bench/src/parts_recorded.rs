@@ -6,6 +6,7 @@ use std::path::Path;
 use tryon_body::Template;
 use tryon_body::parts::BodySide;
 use tryon_geometry::camera::DepthImage;
+use tryon_geometry::math::order_statistics::medians;
 use tryon_geometry::math::{P3d, V3, V3d};
 use tryon_geometry::spatial::OrganisedCloud;
 use tryon_tracking::part_classes::{NECK_CLASS, PartKind};
@@ -188,7 +189,7 @@ fn biases(offsets: &mut [Vec<Option<Offsets>>], joints: usize, is_video: bool) -
                 .flatten()
                 .filter_map(|o| o.first().copied())
                 .collect();
-            let shift = median(&first);
+            let shift = medians(&first).map_or_else(V3d::zeros, V3d::from);
             frame
                 .iter_mut()
                 .flatten()
@@ -206,16 +207,6 @@ fn biases(offsets: &mut [Vec<Option<Offsets>>], joints: usize, is_video: bool) -
         near.iter().sum::<V3d>() / near.len().max(1) as f64
     };
     (0..joints).map(of_joint).collect()
-}
-
-/// Median of each coordinate.
-fn median(vectors: &[V3d]) -> V3d {
-    let of = |k: usize| {
-        let mut x: Vec<f64> = vectors.iter().map(|v| v[k]).collect();
-        x.sort_by(f64::total_cmp);
-        x.get(x.len() / 2).copied().unwrap_or(0.0)
-    };
-    V3d::new(of(0), of(1), of(2))
 }
 
 impl RecordedScores {

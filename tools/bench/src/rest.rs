@@ -8,6 +8,7 @@ use tryon_body::{BodyShape, BoneTransforms, Pose, RestBody, Template, skin};
 use tryon_cloth::{Config, Input, State, StepReport, Workspace, step};
 use tryon_dressing::Dressed;
 use tryon_garment::Size;
+use tryon_geometry::math::order_statistics::{median, percentile};
 use tryon_geometry::math::{Body, P3, Rigid, V3, World};
 use tryon_geometry::par::Par;
 
@@ -172,9 +173,7 @@ impl RestingSubject {
 impl RestReport {
     /// Median time of a step (ms).
     pub fn median_ms(&self) -> f64 {
-        let mut ms = self.ms.clone();
-        ms.sort_unstable_by(f64::total_cmp);
-        ms.get(ms.len() / 2).copied().unwrap_or(0.0)
+        median(&mut self.ms.clone()).unwrap_or(0.0)
     }
     /// Mean time of a step (ms).
     pub fn mean_ms(&self) -> f64 {
@@ -195,13 +194,9 @@ impl RestReport {
             .zip(b.iter().flatten())
             .map(|(p, q)| f64::from((p - q).norm()))
             .collect();
-        far.sort_unstable_by(f64::total_cmp);
         let n = far.len().max(1);
         let rms = (far.iter().map(|d| d * d).sum::<f64>() / n as f64).sqrt();
-        [
-            rms,
-            far.get(far.len() * 99 / 100).copied().unwrap_or(0.0),
-            far.last().copied().unwrap_or(0.0),
-        ]
+        let [p99, most] = [99, 100].map(|p| percentile(&mut far, p).unwrap_or(0.0));
+        [rms, p99, most]
     }
 }

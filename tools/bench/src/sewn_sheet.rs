@@ -5,7 +5,7 @@ use std::cmp::Reverse;
 use std::collections::{BTreeMap, BTreeSet, BinaryHeap};
 use tryon_formats::sewn_obj::Stitch;
 use tryon_geometry::math::V3d;
-use tryon_geometry::mesh::Face;
+use tryon_geometry::mesh::{Face, edge_faces, undirected};
 
 /// Largest distance between the two sides of a seam (m).
 const SEAM_GAP: f64 = 5e-4;
@@ -21,10 +21,6 @@ pub(super) struct SewnSheet {
     pub(super) stitches: Vec<Stitch>,
 }
 
-fn sorted(a: u32, b: u32) -> [u32; 2] {
-    [a.min(b), a.max(b)]
-}
-
 /// Edges by their length; positive lengths order as their bits.
 type Longest = BinaryHeap<(u64, Reverse<[u32; 2]>)>;
 
@@ -33,11 +29,8 @@ impl SewnSheet {
     /// the same surface; a new vertex on a seam is sewn to the other side.
     pub(super) fn divide(&mut self, wanted: usize) {
         let mut beside: BTreeMap<[u32; 2], Vec<u32>> = BTreeMap::new();
-        for (k, f) in self.faces.iter().enumerate() {
-            for i in 0..3 {
-                let edge = beside.entry(sorted(f[i], f[(i + 1) % 3])).or_default();
-                edge.push(k as u32);
-            }
+        for (edge, face) in edge_faces(&self.faces) {
+            beside.entry(edge).or_default().push(face);
         }
         let mut sewn: BTreeSet<u32> = (self.stitches.iter())
             .flat_map(|s| [s.vertex, s.edge[0], s.edge[1]])
@@ -57,7 +50,7 @@ impl SewnSheet {
                 self.stitches.extend(stitch);
             }
             for e in edge {
-                beside.insert(sorted(e, middle), Vec::new());
+                beside.insert(undirected([e, middle]), Vec::new());
             }
             for face in faces {
                 self.halve(face, edge, middle, &mut beside);
@@ -80,7 +73,7 @@ impl SewnSheet {
         self.x.push((self.x[a] + self.x[b]) * 0.5);
         self.flat.push((self.flat[a] + self.flat[b]) * 0.5);
         for s in &mut self.stitches {
-            if sorted(s.edge[0], s.edge[1]) == edge {
+            if undirected([s.edge[0], s.edge[1]]) == edge {
                 (s.edge, s.at) = if s.at <= 0.5 {
                     ([s.edge[0], middle], 2.0 * s.at)
                 } else {
@@ -135,12 +128,12 @@ impl SewnSheet {
         self.faces[face as usize] = [corner, next, middle];
         self.faces.push([corner, middle, last]);
         for (v, own) in [(next, face), (last, other)] {
-            if let Some(faces) = beside.get_mut(&sorted(v, middle)) {
+            if let Some(faces) = beside.get_mut(&undirected([v, middle])) {
                 faces.push(own);
             }
         }
-        beside.insert(sorted(corner, middle), vec![face, other]);
-        if let Some(faces) = beside.get_mut(&sorted(corner, last)) {
+        beside.insert(undirected([corner, middle]), vec![face, other]);
+        if let Some(faces) = beside.get_mut(&undirected([corner, last])) {
             let moved = faces.iter_mut().filter(|f| **f == face);
             moved.for_each(|f| *f = other);
         }
@@ -201,11 +194,8 @@ mod tests {
             sheet.stitches.len()
         );
         // Conforming: an edge has two triangles unless it lies on the border.
-        let mut edges: BTreeMap<[u32; 2], usize> = BTreeMap::new();
-        for f in &sheet.faces {
-            (0..3).for_each(|i| *edges.entry(sorted(f[i], f[(i + 1) % 3])).or_default() += 1);
-        }
-        for (e, count) in edges {
+        for of_edge in edge_faces(&sheet.faces).chunk_by(|a, b| a.0 == b.0) {
+            let (e, count) = (of_edge[0].0, of_edge.len());
             let [a, b] = e.map(|v| sheet.flat[v as usize]);
             let border = (0..2).any(|d| a[d] == b[d] && a[d].fract() == 0.0);
             assert_eq!(count, if border { 1 } else { 2 });

@@ -5,6 +5,7 @@ use std::sync::Arc;
 use std::time::Instant;
 use tryon_body::{BoneTransforms, Template};
 use tryon_geometry::camera::Intrinsics;
+use tryon_geometry::math::order_statistics;
 use tryon_geometry::math::{P3, P3d};
 use tryon_geometry::mesh::Face;
 use tryon_geometry::raster::{View, VisibilityBuffer, rasterise};
@@ -58,9 +59,7 @@ pub fn mean(values: &[f64]) -> f64 {
 
 /// Median; NaN without values.
 pub fn median(values: &[f64]) -> f64 {
-    let mut v = values.to_vec();
-    v.sort_by(f64::total_cmp);
-    v.get(v.len() / 2).copied().unwrap_or(f64::NAN)
+    order_statistics::median(&mut values.to_vec()).unwrap_or(f64::NAN)
 }
 
 /// The part of per-frame values from which run time is taken.

@@ -5,6 +5,7 @@
 
 use crate::contact::{ClosestPoint, SurfaceFrame, SurfaceModel};
 use crate::live::solver::explicit::{ContactPlane, V4};
+use tryon_geometry::math::order_statistics::percentile;
 use tryon_geometry::math::{P3, V3};
 use tryon_geometry::mesh::Csr;
 use tryon_geometry::par::Par;
@@ -128,15 +129,10 @@ impl SelfContactModel {
     /// Takes the sheet as a surface and the lengths of its edges.
     pub fn new(surface: SurfaceModel, lengths: impl Iterator<Item = f32>) -> Self {
         let mut lengths: Vec<f32> = lengths.collect();
-        lengths.sort_unstable_by(f32::total_cmp);
-        let edge = lengths
-            .get(lengths.len() * 95 / 100)
-            .copied()
-            .unwrap_or(0.0);
         Self {
             excluded: surface.second_neighbours(),
             surface,
-            edge,
+            edge: percentile(&mut lengths, 95).unwrap_or(0.0),
         }
     }
     /// 95th percentile of the edge lengths, metres.

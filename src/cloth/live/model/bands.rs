@@ -1,5 +1,7 @@
 //! Bands of a sheet with few edges between them: the vertices of its patches.
 
+use tryon_geometry::mesh::boundary_edges;
+
 /// Cuts all vertices into `count` bands of equal size, in the order that separates the fewest edges. `around` lists the
 /// neighbours of each vertex, `ends` the edges.
 pub(crate) fn bands(
@@ -54,35 +56,20 @@ fn orders(around: &[Vec<u32>], faces: &[[u32; 3]]) -> Vec<Vec<u32>> {
 
 /// Vertices of the two longest boundary loops, the longest first.
 fn longest_boundary_loops(vertices: usize, faces: &[[u32; 3]]) -> Vec<Vec<u32>> {
-    let sides = |t: &[u32; 3]| {
-        [(0, 1), (1, 2), (2, 0)].map(|(i, j): (usize, usize)| [t[i].min(t[j]), t[i].max(t[j])])
-    };
-    let mut edges: Vec<[u32; 2]> = faces.iter().flat_map(sides).collect();
+    let mut edges: Vec<[u32; 2]> = boundary_edges(faces);
+    edges.iter_mut().for_each(|e| e.sort_unstable());
     edges.sort_unstable();
     let mut next = vec![Vec::new(); vertices];
-    for same in edges.chunk_by(|a, b| a == b).filter(|s| s.len() == 1) {
-        let [a, b] = same[0];
+    for [a, b] in edges {
         next[a as usize].push(b);
         next[b as usize].push(a);
     }
-    let mut seen = vec![false; vertices];
-    let mut loops = Vec::new();
-    for v in 0..vertices as u32 {
-        if seen[v as usize] || next[v as usize].is_empty() {
-            continue;
-        }
-        seen[v as usize] = true;
-        let (mut boundary, mut at) = (vec![v], 0);
-        while at < boundary.len() {
-            for w in &next[boundary[at] as usize] {
-                if !std::mem::replace(&mut seen[*w as usize], true) {
-                    boundary.push(*w);
-                }
-            }
-            at += 1;
-        }
-        loops.push(boundary);
-    }
+    let Paths {
+        order, distance, ..
+    } = Paths::from(&next, &[]);
+    let sets = order.chunk_by(|_, v| distance[*v as usize] > 0);
+    let loops = sets.filter(|set| set.len() > 1);
+    let mut loops: Vec<Vec<u32>> = loops.map(<[u32]>::to_vec).collect();
     loops.sort_by_key(|r| std::cmp::Reverse(r.len()));
     loops.truncate(2);
     loops
@@ -142,6 +129,7 @@ fn by_distance(around: &[Vec<u32>]) -> Vec<u32> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use tryon_geometry::mesh::edges;
 
     /// Adjacency, edges and faces.
     type Strip = (Vec<Vec<u32>>, Vec<[u32; 2]>, Vec<[u32; 3]>);
@@ -151,13 +139,7 @@ mod tests {
         let faces: Vec<[u32; 3]> = (0..n)
             .flat_map(|i| [[2 * i, 2 * i + 1, 2 * i + 3], [2 * i, 2 * i + 3, 2 * i + 2]])
             .collect();
-        let mut ends: Vec<[u32; 2]> = faces
-            .iter()
-            .flat_map(|f| [[f[0], f[1]], [f[1], f[2]], [f[0], f[2]]])
-            .map(|e| [e[0].min(e[1]), e[0].max(e[1])])
-            .collect();
-        ends.sort_unstable();
-        ends.dedup();
+        let ends = edges(&faces);
         let mut around = vec![Vec::new(); 2 * n as usize + 2];
         for e in &ends {
             around[e[0] as usize].push(e[1]);

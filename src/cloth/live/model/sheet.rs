@@ -7,6 +7,7 @@ use nalgebra::Matrix3x2;
 use std::sync::Arc;
 use tryon_garment::Material;
 use tryon_geometry::linear::SymmetricPattern;
+use tryon_geometry::math::order_statistics::percentile;
 use tryon_geometry::math::{P3, V3d};
 use tryon_geometry::mesh::{Face, Topology, TriMesh};
 
@@ -49,7 +50,7 @@ impl Element {
 /// Smallest rest area of a triangle, a hundredth of a square millimetre (m²). Smaller ones have no usable gradient.
 const SMALLEST_AREA: f64 = 1e-8;
 /// Quantile of the reported stretch.
-const STRETCH_QUANTILE: f64 = 0.99;
+const STRETCH_PERCENTILE: usize = 99;
 
 /// Immutable description of a sheet.
 #[derive(Clone, Debug)]
@@ -157,10 +158,9 @@ impl Sheet {
         let stretch =
             |(v, l): &([u32; 2], f64)| (x[v[0] as usize] - x[v[1] as usize]).norm() / l - 1.0;
         let mut all: Vec<f64> = self.edges.iter().map(stretch).collect();
-        all.sort_unstable_by(f64::total_cmp);
-        let rank = (all.len() as f64 * STRETCH_QUANTILE) as usize;
-        let at = |rank: usize| all.get(rank.min(all.len().saturating_sub(1))).copied();
-        (at(all.len()).unwrap_or(0.0), at(rank).unwrap_or(0.0))
+        [100, STRETCH_PERCENTILE]
+            .map(|hundredths| percentile(&mut all, hundredths).unwrap_or(0.0))
+            .into()
     }
 }
 

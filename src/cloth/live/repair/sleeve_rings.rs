@@ -6,6 +6,7 @@
 use nalgebra::{Isometry3, Translation3, UnitQuaternion};
 use tryon_body::Template;
 use tryon_garment::{GarmentMesh, Region};
+use tryon_geometry::math::order_statistics::{median, percentile};
 use tryon_geometry::math::{P3, V3};
 use tryon_geometry::mesh::distances;
 
@@ -145,9 +146,7 @@ impl Sleeve {
     /// The sleeves of a garment whose edges have these rest lengths, metres.
     pub fn find(mesh: &GarmentMesh, edges: &[([u32; 2], f64)]) -> Vec<Self> {
         let mut lengths: Vec<f64> = edges.iter().map(|e| e.1).collect();
-        lengths.sort_unstable_by(f64::total_cmp);
-        let at = lengths.len() * EDGE_PERCENTILE / 100;
-        let edge = lengths.get(at).copied().unwrap_or(0.0) as f32;
+        let edge = percentile(&mut lengths, EDGE_PERCENTILE).unwrap_or(0.0) as f32;
         let width = RING.max(RING_EDGES * edge);
         let border = border(mesh);
         (0..ARMS.len())
@@ -179,8 +178,7 @@ impl Sleeve {
             .filter(|v| on(*v) && length(*v).is_finite())
             .collect();
         let mut lengths: Vec<f64> = own.iter().map(|v| length(*v)).collect();
-        lengths.sort_unstable_by(f64::total_cmp);
-        let median = *lengths.get(lengths.len() / 2)? as f32;
+        let median = median(&mut lengths)? as f32;
         let n = (median / width).floor().max(1.0);
         let mut rings = vec![Vec::new(); n as usize];
         for v in own {

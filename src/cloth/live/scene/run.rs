@@ -8,6 +8,7 @@ use std::path::Path;
 use std::time::Instant;
 use tryon_formats::FormatError;
 use tryon_formats::npy::write_npy;
+use tryon_geometry::math::order_statistics::{median, percentile};
 use tryon_geometry::math::{P3, V3d};
 
 /// Report of a run.
@@ -109,7 +110,6 @@ impl RunReport {
         (x, v): &(Vec<V3d>, Vec<V3d>),
     ) -> Self {
         let frames = times.len() + 1;
-        times.sort_by(f64::total_cmp);
         let kinetic: f64 = v
             .iter()
             .zip(&scene.sheet.mass)
@@ -120,9 +120,9 @@ impl RunReport {
             vertices: x.len(),
             substeps: solver.substeps,
             iterations: solver.iterations,
-            ms_median: times.get(times.len() / 2).copied().unwrap_or(0.0),
+            ms_median: median(&mut times).unwrap_or(0.0),
             ms_mean: times.iter().sum::<f64>() / times.len().max(1) as f64,
-            ms_max: times.last().copied().unwrap_or(0.0),
+            ms_max: percentile(&mut times, 100).unwrap_or(0.0),
             p99_strain: scene.sheet.strain(x).1,
             penetration: 0.0,
             energy_end: kinetic + scene.sheet.energy(x),

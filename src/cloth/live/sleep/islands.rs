@@ -7,10 +7,10 @@ use super::criteria::still_skin;
 use super::follow_skin::skin_displacements;
 use super::state::{Island, SleepState};
 use super::wake_source::WakeSources;
-use crate::live::commit::percentile;
 use crate::live::outfit_model::Model;
 use crate::live::patch::PatchWork;
 use crate::live::state::{GarmentState, State};
+use tryon_geometry::math::order_statistics::percentile;
 use tryon_geometry::math::{P3, V3};
 
 /// Speed below which an island may fall asleep, on an exact and on a tracked body, m/s. At 5 mm/s a ninth as much sleeps,

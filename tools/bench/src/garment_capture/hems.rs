@@ -1,10 +1,9 @@
 //! Hems: distance of the seen boundaries of true garments from the rings of found ones.
 
 use crate::scans::TrueGarment;
-use std::collections::BTreeSet;
 use tryon_clothcap::multi::Ring;
 use tryon_geometry::math::P3;
-use tryon_geometry::mesh::Face;
+use tryon_geometry::mesh::boundary_edges;
 use tryon_geometry::spatial::HashGrid;
 
 /// Radius around a hem in which scan points tell whether it is seen, metres.
@@ -36,14 +35,6 @@ pub(super) fn seen_hems(
     };
     let all = boundary_edges(&garment.faces).into_iter().flat_map(ends);
     all.filter(is_seen).collect()
-}
-
-/// Directed edges with one face.
-fn boundary_edges(faces: &[Face]) -> Vec<[u32; 2]> {
-    let sides = |f: &Face| [[f[0], f[1]], [f[1], f[2]], [f[2], f[0]]];
-    let all: BTreeSet<[u32; 2]> = faces.iter().flat_map(sides).collect();
-    let open = |e: &&[u32; 2]| !all.contains(&[e[1], e[0]]);
-    all.iter().filter(open).copied().collect()
 }
 
 /// Mean distance of points from the nearest ring, metres; `vertices` are those of the part. 0 without points or rings.

@@ -3,6 +3,7 @@
 use crate::EvaluateError;
 use serde::Serialize;
 use std::path::{Path, PathBuf};
+use tryon_geometry::math::order_statistics;
 
 /// One measured bar.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -66,10 +67,7 @@ pub(super) fn percent(values: impl IntoIterator<Item = bool>) -> f64 {
 
 /// Value below which a share `q` of the values lie; NaN without values.
 pub(super) fn quantile(values: &[f64], q: f64) -> f64 {
-    let mut v = values.to_vec();
-    v.sort_by(f64::total_cmp);
-    let at = (q * v.len().saturating_sub(1) as f64).ceil() as usize;
-    v.get(at).copied().unwrap_or(f64::NAN)
+    order_statistics::quantile(&mut values.to_vec(), q).unwrap_or(f64::NAN)
 }
 
 /// All bars of a run.
