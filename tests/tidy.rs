@@ -47,6 +47,15 @@ fn files_of_a_crate_import_without_circles() {
 }
 
 #[test]
+fn rooms_of_a_crate_import_downwards() {
+    let sources = source::rust();
+    let rooms = imports::rooms(&imports::Library::new(&sources).imports());
+    let circles = imports::circles(&rooms);
+    let faults: Vec<String> = circles.iter().map(|circle| circle.join(" ⇄ ")).collect();
+    assert_none(&faults);
+}
+
+#[test]
 fn files_stay_small() {
     let faults: Vec<String> = source::rust()
         .iter()

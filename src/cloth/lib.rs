@@ -30,9 +30,9 @@
 //! - Folds no sharper than triangles resolve: [`mod@live::solver::explicit::fold_limit`].
 //! - Exchange between patches: [`mod@live::solver::explicit::halo`].
 //! - Eight floats at once: [`mod@live::solver::explicit::simd`].
-//! - XPBD: [`mod@live::solver::xpbd::constraints`].
-//! - Implicit Euler, BDF2: [`mod@live::solver::implicit::quasi_newton`].
-//! - The paper's mass-spring step: [`mod@live::solver::implicit::mass_spring`].
+//! - XPBD: [`mod@live::solver::xpbd`].
+//! - Implicit Euler, BDF2: [`mod@live::integrators::implicit::quasi_newton`].
+//! - The paper's mass-spring step: [`mod@live::integrators::implicit::mass_spring`].
 //! - Skin contact: [`mod@live::contact::body_contact`].
 //! - Outer garments over inner ones: [`mod@live::contact::layer_height`], [`mod@live::contact::cloth_contact`].
 //! - Folds of one garment: [`mod@live::contact::self_contact`].

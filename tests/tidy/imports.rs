@@ -182,6 +182,28 @@ fn test_modules(text: &str) -> Vec<String> {
         .collect()
 }
 
+/// Folders beside each other that import from each other's files: edges between siblings, at any depth.
+pub(crate) fn rooms(
+    graph: &BTreeMap<Vec<String>, BTreeSet<Vec<String>>>,
+) -> BTreeMap<Vec<String>, BTreeSet<Vec<String>>> {
+    let mut rooms = BTreeMap::<_, BTreeSet<_>>::new();
+    let folders: BTreeSet<&[String]> = graph.keys().map(|m| &m[..m.len() - 1]).collect();
+    for (from, others) in graph {
+        for other in others {
+            let common = from.iter().zip(other).take_while(|(a, b)| a == b).count();
+            let [Some(a), Some(b)] = [from, other].map(|m| m.get(..=common)) else {
+                continue;
+            };
+            rooms.entry(a.to_vec()).or_default();
+            if folders.contains(a) && folders.contains(b) {
+                rooms.entry(a.to_vec()).or_default().insert(b.to_vec());
+                rooms.entry(b.to_vec()).or_default();
+            }
+        }
+    }
+    rooms
+}
+
 /// Sets of two or more files each of which imports, by some way, every other.
 pub(crate) fn circles(graph: &BTreeMap<Vec<String>, BTreeSet<Vec<String>>>) -> Vec<Vec<String>> {
     let reach: BTreeMap<_, BTreeSet<Vec<String>>> = graph

@@ -1,4 +1,4 @@
-//! One step of garment motion against a moving body, `filter → collide → solve → commit → sleep`: `model/` (sheet, membrane, bending, partition), `solver/` (explicit, xpbd, implicit behind one trait), `sleep/`, `repair/`.
+//! One step of garment motion against a moving body, `filter → collide → solve → commit → sleep`: `model/` (sheet, membrane, bending, partition), `solver/` (kernels of the substeps), `contact/`, `sleep/`, `repair/`; `integrators/` (one sheet among moving solids, by several methods) for scene files.
 //!
 //! The real-time simulator follows Ye et al. 2014, section 4, "Near Realtime simulation".
 
@@ -9,6 +9,7 @@ mod config;
 mod contact;
 mod error;
 mod garment_model;
+pub mod integrators;
 pub mod model;
 mod outfit;
 mod outfit_model;

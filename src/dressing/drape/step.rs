@@ -2,7 +2,7 @@
 
 use super::context::DrapeContext;
 use super::state::Drape;
-use tryon_cloth::solver::xpbd::constraints::{project_distance, project_hinge};
+use tryon_cloth::solver::xpbd::{project_distance, project_hinge};
 use tryon_geometry::math::V3d;
 
 /// m/s².

@@ -3,7 +3,7 @@
 use super::context::DrapeContext;
 use super::state::{Drape, on_arms};
 use super::step::QUERY_INTERVAL;
-use tryon_cloth::solver::xpbd::constraints::project_distance;
+use tryon_cloth::solver::xpbd::project_distance;
 use tryon_cloth::untangler::{UNTANGLE_GAP, UNTANGLE_STEP};
 use tryon_geometry::par::Par;
 

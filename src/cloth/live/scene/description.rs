@@ -1,6 +1,6 @@
 //! A scene in memory.
 
-use crate::live::solver::collider::Collider;
+use crate::live::integrators::collider::Collider;
 use crate::live::{ClothError, Sheet};
 use tryon_formats::FormatError;
 use tryon_garment::Material;

@@ -5,8 +5,8 @@ mod description;
 mod file;
 mod run;
 
-pub use super::solver::collider::{Collider, Primitive};
-pub use super::solver::{Method, RunConfig};
+pub use super::integrators::collider::{Collider, Primitive};
+pub use super::integrators::{Method, RunConfig};
 pub use description::{Scene, SceneError};
 pub use file::{load, parse};
 pub use run::{RunReport, run, write_positions};

@@ -1,7 +1,7 @@
 //! A scene from start to end by any solver.
 
 use super::{Scene, SceneError};
-use crate::live::solver::{Environment, RunConfig, SheetStart, SolverReport, solver};
+use crate::live::integrators::{Environment, RunConfig, SheetStart, SolverReport, solver};
 use serde::Serialize;
 use std::ops::ControlFlow;
 use std::path::Path;
@@ -138,8 +138,8 @@ impl RunReport {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::live::integrators::Method;
     use crate::live::scene::parse;
-    use crate::live::solver::Method;
     use tryon_geometry::spatial::intersections;
 
     /// A square sheet of 0.3 m, held at two corners, that falls and swings.

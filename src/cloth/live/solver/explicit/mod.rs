@@ -22,10 +22,7 @@ mod mass_filter;
 mod patch_compile;
 mod patch_model;
 mod patch_state;
-mod self_collision;
 mod simd;
-mod solid_contacts;
-mod solver;
 mod stability;
 mod stable_sheet;
 mod substeps;
@@ -42,6 +39,3 @@ pub use patch_state::{Exemptions, PatchState, Substep};
 pub use stable_sheet::{StableSheet, StepSpec};
 pub use substeps::run_substeps;
 pub use vec4::V4;
-
-pub(super) use solid_contacts::{RECOVERY_SPEED, SolidContacts, moving_pins};
-pub(super) use solver::ExplicitSolver;

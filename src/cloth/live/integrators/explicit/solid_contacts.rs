@@ -1,9 +1,9 @@
 //! Contact planes of solids and targets of pins near one patch.
 
-use super::constraint::{ContactPlane, Pin};
-use super::patch_state::PatchState;
-use crate::live::solver::Environment;
-use crate::live::solver::collider::Collider;
+use crate::live::integrators::Environment;
+use crate::live::integrators::collider::Collider;
+use crate::live::solver::explicit::PatchState;
+use crate::live::solver::explicit::{ContactPlane, Pin};
 use nalgebra::{Isometry3, Point3};
 use tryon_geometry::math::V3d;
 

@@ -1,11 +1,11 @@
 //! Time loop of the solvers that update the velocities of a whole sheet at once, before contact.
 
-use super::explicit::{
-    ContactPlane, PatchModel, PatchState, Pin, RECOVERY_SPEED, SolidContacts, StableSheet,
-    StepSpec, Substep, V4, moving_pins,
-};
+use super::explicit::{RECOVERY_SPEED, SolidContacts, moving_pins};
 use super::{Environment, SheetStart, Solver, SolverReport, check_finite};
 use crate::live::ClothError;
+use crate::live::solver::explicit::{
+    ContactPlane, PatchModel, PatchState, Pin, StableSheet, StepSpec, Substep, V4,
+};
 use tryon_geometry::math::V3d;
 
 /// Step so short that nothing is softened (s): the update is stable at any step.

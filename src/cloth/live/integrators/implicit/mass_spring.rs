@@ -2,12 +2,12 @@
 //! 1998, eq. 6).
 
 use crate::live::ClothError;
-use crate::live::solver::explicit::edge_stiffness::triangle_springs;
-use crate::live::solver::explicit::{PatchModel, PatchState, Pin};
-use crate::live::solver::single_patch::{
+use crate::live::integrators::single_patch::{
     SinglePatchSolver, VelocityUpdate, local_numbers, whole_sheet,
 };
-use crate::live::solver::{Environment, RunConfig, SheetStart};
+use crate::live::integrators::{Environment, RunConfig, SheetStart};
+use crate::live::solver::explicit::edge_stiffness::triangle_springs;
+use crate::live::solver::explicit::{PatchModel, PatchState, Pin};
 use nalgebra::Matrix3;
 use std::collections::BTreeMap;
 use tryon_geometry::linear::{BlockJacobi, CgAccuracy, StopCriterion, conjugate_gradient};
@@ -34,7 +34,7 @@ struct Spring {
 }
 
 /// Springs along edges and between the opposite corners of hinges.
-pub(in super::super) struct Springs {
+pub(in crate::live::integrators) struct Springs {
     springs: Vec<Spring>,
     mass: Vec<f64>,
     gravity: V3d,
@@ -42,7 +42,7 @@ pub(in super::super) struct Springs {
 }
 
 /// Mass-spring solver of a sheet, at `rate` frames a second.
-pub(in super::super) fn solver(
+pub(in crate::live::integrators) fn solver(
     start: SheetStart<'_>,
     environment: &Environment<'_>,
     config: &RunConfig,

@@ -1,15 +1,17 @@
 //! A sheet by explicit substeps.
 
-use super::constraint::{ContactPlane, Pin};
-use super::patch_model::PatchModel;
-use super::patch_state::{PatchState, Substep};
 use super::self_collision::{FoldContacts, SelfCollision};
 use super::solid_contacts::{RECOVERY_SPEED, SolidContacts, moving_pins};
-use super::stable_sheet::{StableSheet, StepSpec};
-use super::substeps::run_substeps;
-use super::vec4::V4;
 use crate::live::ClothError;
-use crate::live::solver::{Environment, RunConfig, SheetStart, Solver, SolverReport, check_finite};
+use crate::live::integrators::{
+    Environment, RunConfig, SheetStart, Solver, SolverReport, check_finite,
+};
+use crate::live::solver::explicit::PatchModel;
+use crate::live::solver::explicit::V4;
+use crate::live::solver::explicit::run_substeps;
+use crate::live::solver::explicit::{ContactPlane, Pin};
+use crate::live::solver::explicit::{PatchState, Substep};
+use crate::live::solver::explicit::{StableSheet, StepSpec};
 use tryon_geometry::math::V3d;
 use tryon_geometry::par::Par;
 

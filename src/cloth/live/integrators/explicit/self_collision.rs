@@ -1,12 +1,12 @@
 //! Contact of a sheet with itself in the explicit solver.
 
-use super::constraint::ContactPlane;
-use super::patch_model::PatchModel;
-use super::vec4::V4;
 use crate::contact::SurfaceModel;
 use crate::live::ClothError;
 use crate::live::contact::self_contact::{Search, SelfContactFrame, SelfContactModel};
-use crate::live::solver::{RunConfig, SheetStart};
+use crate::live::integrators::{RunConfig, SheetStart};
+use crate::live::solver::explicit::ContactPlane;
+use crate::live::solver::explicit::PatchModel;
+use crate::live::solver::explicit::V4;
 use nalgebra::Matrix3;
 use tryon_geometry::math::{P3, V3};
 use tryon_geometry::mesh::{Topology, TriMesh};

@@ -1,13 +1,13 @@
 //! A sheet by XPBD, on the edges and bending of the explicit solver.
 
-use super::constraints::TriangleConstraint;
 use crate::live::ClothError;
-use crate::live::solver::explicit::edge_stiffness::triangle_springs;
-use crate::live::solver::explicit::{PatchModel, PatchState, Pin, V4};
-use crate::live::solver::single_patch::{
+use crate::live::integrators::single_patch::{
     SinglePatchSolver, VelocityUpdate, local_numbers, whole_sheet,
 };
-use crate::live::solver::{Environment, RunConfig, SheetStart};
+use crate::live::integrators::{Environment, RunConfig, SheetStart};
+use crate::live::solver::explicit::edge_stiffness::triangle_springs;
+use crate::live::solver::explicit::{PatchModel, PatchState, Pin, V4};
+use crate::live::solver::xpbd::TriangleConstraint;
 
 /// Substeps a frame when none are asked for.
 const DEFAULT_SUBSTEPS: usize = 40;
@@ -15,7 +15,7 @@ const DEFAULT_SUBSTEPS: usize = 40;
 const DEFAULT_BENDING_INTERVAL: usize = 4;
 
 /// One pass over the triangles a substep.
-pub(in super::super) struct TrianglePass {
+pub(in crate::live::integrators) struct TrianglePass {
     constraints: Vec<TriangleConstraint>,
     /// Inverse masses, 0 where pinned [1/kg].
     weight: Vec<f32>,
@@ -26,7 +26,7 @@ pub(in super::super) struct TrianglePass {
 }
 
 /// XPBD solver of a sheet, at `rate` frames a second.
-pub(in super::super) fn solver(
+pub(in crate::live::integrators) fn solver(
     start: SheetStart<'_>,
     environment: &Environment<'_>,
     config: &RunConfig,

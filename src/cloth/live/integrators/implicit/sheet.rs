@@ -1,7 +1,7 @@
 //! A sheet by implicit Euler or BDF2, with positions projected out of solids.
 
 use super::quasi_newton::{Hold, QuasiNewton, hold_unit};
-use crate::live::solver::{
+use crate::live::integrators::{
     Environment, Method, RunConfig, SheetStart, Solver, SolverReport, check_finite,
 };
 use crate::live::{ClothError, Sheet};
@@ -19,7 +19,7 @@ const DEFAULT_SUBSTEPS: usize = 8;
 type Kinematics = (Vec<V3d>, Vec<V3d>);
 
 /// A sheet by a prefactorised quasi-Newton iteration.
-pub(in super::super) struct ImplicitSolver<'a> {
+pub(in crate::live::integrators) struct ImplicitSolver<'a> {
     sheet: &'a Sheet,
     config: RunConfig,
     substeps: usize,
@@ -43,7 +43,7 @@ struct EulerStep {
 }
 
 impl<'a> ImplicitSolver<'a> {
-    pub(in super::super) fn new(
+    pub(in crate::live::integrators) fn new(
         start: SheetStart<'a>,
         config: &RunConfig,
         rate: f64,
