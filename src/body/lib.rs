@@ -13,6 +13,7 @@
 //!   [`mod@embedded::rig`], [`mod@embedded::directions`] (shape space), [`mod@embedded::statistics`] (published
 //!   measurements).
 //! - Tape measures: [`mod@measure::tape`].
+//! - Arms turned out of the trunk, for the easy pose of the first drape: [`mod@arm_clearance`].
 //! - A skeleton for a bare scan: [`mod@rig`], `src/dressing/rig_standing.rs`.
 //!
 //! Garments from scans:
@@ -20,6 +21,7 @@
 //! - Pose blend shapes (eq. 1, 2): [`mod@pose_shapes`], [`mod@pose_offsets`].
 #![allow(rustdoc::private_intra_doc_links)] // the index of ideas names private modules
 
+mod arm_clearance;
 #[cfg(test)]
 #[expect(dead_code, reason = "colours are checked in the other crate")]
 #[path = "../formats/gltf/skinned/decoded.rs"]
@@ -40,6 +42,7 @@ mod skin_weights;
 mod skinning;
 mod template;
 
+pub use arm_clearance::ArmClearance;
 pub use error::BodyError;
 pub use pose::{BoneTransforms, Pose};
 pub use pose_offsets::PoseOffsets;
