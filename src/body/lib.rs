@@ -11,6 +11,7 @@
 //! - Parts, limbs, joint names: [`mod@parts::joints`], [`mod@parts::vertices`].
 //! - The embedded figure: [`mod@embedded`], read by [`mod@template_file`].
 //! - Tape measures: [`mod@measure::tape`].
+//! - Arms turned out of the trunk, for the easy pose of the first drape: [`mod@arm_clearance`].
 //! - A skeleton for a bare scan: [`mod@rig`], `src/dressing/rig_standing.rs`.
 //!
 //! Garments from scans:
@@ -18,6 +19,7 @@
 //! - Pose blend shapes (eq. 1, 2): [`mod@pose_shapes`], [`mod@pose_offsets`].
 #![allow(rustdoc::private_intra_doc_links)] // the index of ideas names private modules
 
+mod arm_clearance;
 #[cfg(test)]
 #[expect(dead_code, reason = "colours are checked in the other crate")]
 #[path = "../formats/gltf/skinned/decoded.rs"]
@@ -39,6 +41,7 @@ mod skinning;
 mod template;
 mod template_file;
 
+pub use arm_clearance::ArmClearance;
 pub use error::BodyError;
 pub use pose::{BoneTransforms, Pose};
 pub use pose_offsets::PoseOffsets;

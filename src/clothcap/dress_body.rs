@@ -7,10 +7,9 @@ use super::multi::MultiCloth;
 use super::retarget::{PenetrationSolver, RetargetReport, SolidBody, on_body, pose_part};
 use super::topology::ClothTemplate;
 use std::sync::Arc;
-use tryon_body::{BoneTransforms, Pose, RestBody, Template};
+use tryon_body::{ArmClearance, BoneTransforms, Pose, RestBody, Template};
 use tryon_geometry::math::{P3, V3, World};
 use tryon_geometry::par::Par;
-use tryon_tracking::ArmClearance;
 
 /// Dressed body in one pose.
 #[derive(Clone, Debug)]

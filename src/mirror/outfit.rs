@@ -5,12 +5,11 @@ use super::clock::NOMINAL;
 use super::wear_watch::{SETTLING, WearWatch};
 use std::sync::Arc;
 use tryon_body::parts::vertex_masks;
-use tryon_body::{BoneTransforms, Pose, RestBody, Template};
+use tryon_body::{ArmClearance, BoneTransforms, Pose, RestBody, Template};
 use tryon_cloth::ClothError;
 use tryon_cloth::{Config, Input, Model, State, StepReport, Workspace, step};
 use tryon_dressing::{DressError, DressOptions, GarmentSource, dress_all};
 use tryon_geometry::math::{Camera, P3, Rigid, World};
-use tryon_tracking::ArmClearance;
 
 /// Tracked body that is dressed.
 #[derive(Clone, Copy, Debug)]

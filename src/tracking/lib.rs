@@ -53,14 +53,9 @@
 //! - In turns with the pose: [`mod@shape::calibration`].
 //! - Displacements (eq. 13 to 17): [`mod@shape::surface`], when they are due: [`mod@adaptation`].
 //! - Bodies that were measured before: [`mod@shape::known_body`], [`mod@shape::probation`], [`mod@known_subject`].
-//!
-//! Cloth:
-//!
-//! - Easy pose of the first drape: [`mod@arm_clearance`].
 #![allow(rustdoc::private_intra_doc_links)] // the index of ideas names private modules, `pub(crate)` for it
 
 mod adaptation;
-mod arm_clearance;
 mod assess;
 mod change_detection;
 mod fit;
@@ -82,11 +77,9 @@ mod test_scene;
 mod workspace;
 
 pub use adaptation::adapt_surface;
-pub use arm_clearance::ArmClearance;
 pub use assess::{Agreement, ConfidenceReason, JointConfidence};
 pub use model::{PartClasses, TrackerConfig, TrackerModel, part_classes};
 pub use registration::residual::SurfaceNormals;
-pub use registration::{apply, linearise};
 pub use report::{Skipped, StepError, StepReport, TrackingStagesMs};
 pub use shape::{KnownBody, ShapeFault, SizeEstimate, SurfaceStatistics};
 pub use start::{Facing, JointProposals, ProposedAnchor, facing, yaw_of_joints, yaw_of_trunk};

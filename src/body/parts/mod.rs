@@ -5,5 +5,5 @@ mod trunk;
 mod vertices;
 
 pub use joints::{BodyPart, BodyParts, BodySegment, BodySide, LimbJoints};
-pub use trunk::{EllipticSection, TrunkFrame};
+pub use trunk::{EllipticColumn, EllipticSection, TrunkFrame};
 pub use vertices::{hinge_vertices, mean_radius, opposing_masks, pressing_masks, vertex_masks};

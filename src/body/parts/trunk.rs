@@ -1,4 +1,4 @@
-//! Upright frame and elliptic sections of the trunk.
+//! Upright frame, elliptic sections and column of the trunk.
 
 use super::BodyPart;
 use crate::Template;
@@ -6,6 +6,8 @@ use tryon_geometry::math::{P3, P3d, V3d};
 
 /// Half axis of an ellipse over the standard deviation of points on it.
 const HALF_AXIS: f64 = std::f64::consts::SQRT_2;
+/// Share of the way from axis to surface within which the direction out isn't known.
+const AXIS: f64 = 1e-3;
 
 /// Frame of a trunk between pelvis and shoulders.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -80,6 +82,31 @@ impl EllipticSection {
     }
 }
 
+/// An upright column of elliptic section, metres.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct EllipticColumn {
+    /// Centre of the lower end.
+    pub base: P3d,
+    /// Unit vectors across, up and to the front.
+    pub axes: [V3d; 3],
+    /// Half axes of the section, across and to the front.
+    pub half: [f64; 2],
+    /// Height.
+    pub height: f64,
+}
+
+impl EllipticColumn {
+    /// Distance of `p` from the axis as a share of that of the surface, and its gradient, 1/m; `None` outside and on the axis.
+    pub fn inside(&self, p: &P3d) -> Option<(f64, V3d)> {
+        let [across, up, front] = self.axes.map(|a| a.dot(&(p - self.base)));
+        let scaled = [across / self.half[0], front / self.half[1]];
+        let share = scaled[0].hypot(scaled[1]);
+        let is_inside = (0.0..self.height).contains(&up) && (AXIS..1.0).contains(&share);
+        let slope = |k: usize, axis: usize| self.axes[axis] * (scaled[k] / self.half[k]);
+        is_inside.then(|| (share, (slope(0, 0) + slope(1, 2)) / share))
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -110,5 +137,31 @@ mod tests {
         assert_eq!(frame.local(&(pelvis + V3d::y())), [0.0, 1.0, 0.0]);
         assert_eq!(TrunkFrame::new(pelvis, [pelvis; 2]), None);
         assert_eq!(TrunkFrame::new(pelvis, [pelvis, pelvis + V3d::x()]), None);
+    }
+
+    fn column() -> EllipticColumn {
+        EllipticColumn {
+            base: P3d::new(0.15, 0.3, 1.75),
+            axes: [V3d::x(), V3d::y(), V3d::z()],
+            half: [0.2, 0.15],
+            height: 0.5,
+        }
+    }
+
+    #[test]
+    fn only_points_between_axis_and_surface_are_inside() {
+        let c = column();
+        let at = |across: f64, up: f64, front: f64| c.base + V3d::new(across, up, front);
+        let (share, gradient) = c.inside(&at(0.0, 0.2, 0.075)).expect("halfway");
+        assert!((share - 0.5).abs() < 1e-12);
+        assert!((gradient - V3d::z() / 0.15).norm() < 1e-12);
+        for p in [
+            at(0.0, 0.2, 0.0),
+            at(0.0, -0.1, 0.05),
+            at(0.21, 0.2, 0.0),
+            at(0.0, 0.6, 0.05),
+        ] {
+            assert_eq!(c.inside(&p), None, "{p}");
+        }
     }
 }

@@ -17,8 +17,7 @@ use tryon_body::{BodyShape, BoneTransforms, Pose, RestBody, Template, skin_moved
 use tryon_geometry::math::{P3, V3, World};
 use tryon_geometry::par::{self, Par};
 use tryon_geometry::spatial::Bvh;
-use tryon_tracking::registration::GemanMcClure;
-use tryon_tracking::{apply, linearise};
+use tryon_tracking::registration::{GemanMcClure, apply, linearise};
 
 /// Standard deviation of a scan point from the body, metres, and number of independent ones: neighbours share the cloth
 /// between. Their ratio weighs data against priors.

@@ -1,8 +1,7 @@
 //! Arms and legs as chains of a ball, a hinge and an end; two-bone inverse kinematics by the law of cosines.
 
-use crate::registration::residual::EllipticColumn;
 use nalgebra::{UnitQuaternion, Vector3};
-use tryon_body::parts::{BodyPart, LimbJoints};
+use tryon_body::parts::{BodyPart, EllipticColumn, LimbJoints};
 use tryon_body::{BoneTransforms, JointMotion, Pose, RestBody, Skeleton, Template};
 use tryon_geometry::math::{P3d, exp_so3, log_so3};
 use tryon_geometry::spatial::{Label, OrganisedCloud};

@@ -1,8 +1,7 @@
 //! The trunk as a column that arms do not enter.
 
 use super::limb::Limb;
-use crate::registration::residual::EllipticColumn;
-use tryon_body::parts::{EllipticSection, TrunkFrame};
+use tryon_body::parts::{EllipticColumn, EllipticSection, TrunkFrame};
 use tryon_body::{BodyShape, BoneTransforms, Template};
 
 /// Share of the section that counts as inside: hands press into clothes and soft bodies.

@@ -12,7 +12,7 @@ pub(crate) mod prior;
 pub(crate) mod surface;
 mod term;
 
-pub use clearance::{ClearanceResidual, EllipticColumn};
+pub use clearance::ClearanceResidual;
 pub use edge::EdgeResidual;
 pub use floor::{FloorPlane, FloorResidual, FloorWeights, FootChain, is_in_view};
 pub use free_space::FreeSpaceResidual;

@@ -3,10 +3,11 @@
 //! A tracked body wears the clothes of its person on its trunk, so that arms at its sides reach into it, by half their
 //! thickness on real recordings. No sleeve fits there.
 
-use crate::registration::residual::EllipticColumn;
+use crate::parts::{
+    BodyPart, EllipticColumn, EllipticSection, LimbJoints, TrunkFrame, mean_radius,
+};
+use crate::{BoneTransforms, Pose, RestBody, Template};
 use nalgebra::UnitQuaternion;
-use tryon_body::parts::{BodyPart, EllipticSection, LimbJoints, TrunkFrame, mean_radius};
-use tryon_body::{BoneTransforms, Pose, RestBody, Template};
 use tryon_geometry::math::{P3d, V3d, exp_so3, log_so3};
 
 /// Bands of the trunk between pelvis and shoulders, 6 cm each: waist and chest differ.
@@ -150,7 +151,7 @@ fn sections(template: &Template, rest: &RestBody, frame: &TrunkFrame) -> [Ellipt
 #[cfg(test)]
 mod tests {
     use super::*;
-    use tryon_body::{BodyShape, embedded};
+    use crate::{BodyShape, embedded};
     use tryon_geometry::math::{Body, Rigid, World};
 
     /// Step by which the upper arms are lowered from the rest pose, and the number of steps, radians.
