@@ -1,11 +1,11 @@
 //! Time step of the cloth from the capture times of frames.
 
-/// Time step where frames give none [s]: a camera of 30 frames a second.
+/// Time step where frames give none (s): a camera of 30 frames a second.
 pub(super) const NOMINAL: f64 = 1.0 / 30.0;
-/// Time steps of the cloth [s]. A longer gap is a pause of the camera and no huge step; 0.2 s is a camera of 5 frames a second.
+/// Time steps of the cloth (s). A longer gap is a pause of the camera and no huge step; 0.2 s is a camera of 5 frames a second.
 const STEPS: [f64; 2] = [1.0 / 120.0, 0.2];
 
-/// Time step of the cloth for a gap between frames [s].
+/// Time step of the cloth for a gap between frames (s).
 pub fn time_step(gap: f64) -> f64 {
     if gap > 0.0 {
         gap.clamp(STEPS[0], STEPS[1])
@@ -28,7 +28,7 @@ impl FrameClock {
         }
     }
 
-    /// Time since the previous frame [s]; 0 for the first frame and for one that is not later.
+    /// Time since the previous frame (s); 0 for the first frame and for one that is not later.
     pub fn gap(&mut self, time_ns: u64) -> f64 {
         let last = self.last_ns.replace(time_ns).unwrap_or(time_ns);
         time_ns.saturating_sub(last) as f64 * 1e-9

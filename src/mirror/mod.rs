@@ -24,18 +24,18 @@
 //! ```
 
 mod body;
-mod captured;
+pub(crate) mod captured;
 mod chain;
-mod choice;
-mod clock;
+pub(crate) mod choice;
+pub(crate) mod clock;
 mod error;
 mod offline_drape;
-mod offline_outfit;
-mod outfit;
+pub(crate) mod offline_outfit;
+pub(crate) mod outfit;
 mod painter;
-mod picture;
+pub(crate) mod picture;
 mod report;
-mod wear;
+pub(crate) mod wear;
 mod wear_watch;
 
 pub use body::PosedBody;

@@ -36,7 +36,7 @@ pub struct Wear {
 pub struct WearStep {
     /// Report of the cloth.
     pub report: StepReport,
-    /// Time of the stream since the last step [s].
+    /// Time of the stream since the last step (s).
     pub gap: f64,
 }
 

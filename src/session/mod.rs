@@ -18,9 +18,9 @@
 //! not edges: the observer repeats a fault while it lasts, so that one hidden by a worse fault surfaces afterwards.
 //! Of two faults the one further upstream is reported, since it explains the other.
 
-mod ages;
+pub(crate) mod ages;
 mod state;
-mod table;
+pub(crate) mod table;
 
 pub use ages::{Ages, SilenceLimits};
 pub use state::{ChainStage, Event, Fault, State};

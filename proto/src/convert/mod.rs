@@ -4,9 +4,9 @@
 //! by its path, `message.field`, as in the protos.
 
 pub mod body;
-mod bulk;
+pub(crate) mod bulk;
 mod codec;
-mod error;
+pub(crate) mod error;
 pub mod fit;
 pub mod frame;
 pub mod garment;

@@ -1,6 +1,6 @@
 //! Measurements of a body for choosing sizes.
 
 mod section;
-mod tape;
+pub(crate) mod tape;
 
 pub use tape::{MeasureError, Measurements, measure};

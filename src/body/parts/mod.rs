@@ -1,8 +1,8 @@
 //! The map from joints and vertices of a body to its segments, sides, parts and limbs.
 
-mod joints;
+pub(crate) mod joints;
 mod trunk;
-mod vertices;
+pub(crate) mod vertices;
 
 pub use joints::{BodyPart, BodyParts, BodySegment, BodySide, LimbJoints};
 pub use trunk::{EllipticColumn, EllipticSection, TrunkFrame};

@@ -2,21 +2,21 @@
 //!
 //! The body is built once a pose: cloth collides with it, dressing drapes on it, the compositor draws it. Nothing here steps time.
 
-mod body_filter;
+pub(crate) mod body_filter;
 pub mod broad_phase;
 pub mod ccd;
 mod closest_multistart;
-mod closest_point;
-mod collision_body;
+pub(crate) mod closest_point;
+pub(crate) mod collision_body;
 mod contact_mesh;
-mod depth_maps;
-mod distance;
+pub(crate) mod depth_maps;
+pub(crate) mod distance;
 mod edge_triangle;
-mod interior;
-mod joint_clearance;
+pub(crate) mod interior;
+pub(crate) mod joint_clearance;
 mod pair;
-mod part_clearance;
-mod potential;
+pub(crate) mod part_clearance;
+pub(crate) mod potential;
 mod proximity_cache;
 mod skin_grid;
 mod surface;

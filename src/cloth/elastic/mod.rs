@@ -1,25 +1,25 @@
 //! Elasticity of a thin sheet in f64: stretch and bend laws, membranes, hinges, dihedral angles, the cloth model with its masses, assembly.
 
-mod assembly;
-mod bend_law;
-mod curvature_set;
-mod curvature_weights;
-mod dihedral;
+pub(crate) mod assembly;
+pub(crate) mod bend_law;
+pub(crate) mod curvature_set;
+pub(crate) mod curvature_weights;
+pub(crate) mod dihedral;
 mod edges;
 mod element_set;
 mod error;
 mod fabric;
 mod fan_expansion;
 mod fans;
-mod hinge;
+pub(crate) mod hinge;
 mod jet;
-mod measured_bend;
-mod measured_stretch;
-mod membrane;
-mod model;
+pub(crate) mod measured_bend;
+pub(crate) mod measured_stretch;
+pub(crate) mod membrane;
+pub(crate) mod model;
 mod packed;
-mod rest_sheet;
-mod stretch_law;
+pub(crate) mod rest_sheet;
+pub(crate) mod stretch_law;
 #[cfg(test)]
 mod test_cantilever;
 #[cfg(test)]

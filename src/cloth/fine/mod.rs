@@ -1,27 +1,27 @@
 //! Offline cloth on contact that never fails: steps, static drape, animation, checkpoints, obstacle springs.
 
-mod animation;
-mod checkpoint;
+pub(crate) mod animation;
+pub(crate) mod checkpoint;
 mod checks;
-mod contacts;
-mod drape;
+pub(crate) mod contacts;
+pub(crate) mod drape;
 mod elastic_term;
-mod energy_term;
+pub(crate) mod energy_term;
 mod error;
-mod garment_cloth;
-mod integrator;
+pub(crate) mod garment_cloth;
+pub(crate) mod integrator;
 mod linear_solver;
 mod model;
-mod newton;
-mod obstacle;
-mod potential;
-mod problem;
-mod scene_run;
-mod sleep;
-mod sleepers;
+pub(crate) mod newton;
+pub(crate) mod obstacle;
+pub(crate) mod potential;
+pub(crate) mod problem;
+pub(crate) mod scene_run;
+pub(crate) mod sleep;
+pub(crate) mod sleepers;
 mod solid_mesh;
-mod start;
-mod step;
+pub(crate) mod start;
+pub(crate) mod step;
 mod stitch;
 mod targets;
 #[cfg(test)]

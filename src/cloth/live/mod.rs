@@ -2,11 +2,11 @@
 //!
 //! The real-time simulator follows Ye et al. 2014, section 4, "Near Realtime simulation".
 
-mod collide;
+pub(crate) mod collide;
 mod collision;
-mod commit;
+pub(crate) mod commit;
 mod config;
-mod contact;
+pub(crate) mod contact;
 mod error;
 mod garment_model;
 pub mod integrators;
@@ -14,14 +14,14 @@ pub mod model;
 mod outfit;
 mod outfit_model;
 mod patch;
-mod repair;
+pub(crate) mod repair;
 mod report;
 pub mod scene;
-mod sleep;
-mod solve;
+pub(crate) mod sleep;
+pub(crate) mod solve;
 pub mod solver;
 mod state;
-mod step;
+pub(crate) mod step;
 #[cfg(test)]
 mod test_outfit;
 mod workspace;

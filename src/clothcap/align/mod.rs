@@ -1,21 +1,21 @@
 //! Single-mesh alignment (section 5.1): body model, then free surface, first of one scan, then of a sequence.
 
 mod active_vertices;
-mod aligner;
+pub(crate) mod aligner;
 mod angle_priors;
 mod arms;
-mod body_equations;
-mod face_cache;
+pub(crate) mod body_equations;
+pub(crate) mod face_cache;
 mod face_walk;
-mod free_surface;
+pub(crate) mod free_surface;
 mod jacobian;
-mod legs;
-mod model_fit;
+pub(crate) mod legs;
+pub(crate) mod model_fit;
 mod pairing;
-mod quadratic;
+pub(crate) mod quadratic;
 mod shape_unknowns;
-mod shared_shape;
-mod start;
+pub(crate) mod shared_shape;
+pub(crate) mod start;
 
 pub(super) use active_vertices::ActiveVertices;
 pub use active_vertices::VertexCounts;

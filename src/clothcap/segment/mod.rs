@@ -1,14 +1,14 @@
 //! Body-model aided segmentation (section 5.2): labels of the template, then of the scan, and the rings between them.
 
-mod color_mixture;
+pub(crate) mod color_mixture;
 mod islands;
-mod labelling;
+pub(crate) mod labelling;
 mod node_colors;
-mod outfit;
-mod prior;
-mod scan_labels;
-mod torso;
-mod unseen;
+pub(crate) mod outfit;
+pub(crate) mod prior;
+pub(crate) mod scan_labels;
+pub(crate) mod torso;
+pub(crate) mod unseen;
 
 pub use color_mixture::{ColorMixture, hsv_cone, k_means};
 pub use labelling::{LabelConfig, Labelling, relabel_nodes};

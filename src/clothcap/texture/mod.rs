@@ -1,10 +1,10 @@
 //! Texture of a captured garment: an atlas of flat charts over its surface, and an image painted from the scans' points.
 
-mod atlas;
-mod charts;
+pub(crate) mod atlas;
+pub(crate) mod charts;
 mod image;
 mod packing;
-mod paint;
+pub(crate) mod paint;
 #[cfg(test)]
 mod tests;
 

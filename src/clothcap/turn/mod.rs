@@ -5,12 +5,12 @@
 //! [`OutfitCapture`](super::OutfitCapture) captures like any other.
 
 mod error;
-mod frame_points;
-mod fused_cloud;
+pub(crate) mod frame_points;
+pub(crate) mod fused_cloud;
 mod fusion;
-mod key_frames;
+pub(crate) mod key_frames;
 mod moving_parts;
-mod multi_view;
+pub(crate) mod multi_view;
 mod report;
 #[cfg(test)]
 mod tests;

@@ -7,7 +7,7 @@ mod contact;
 mod context;
 mod layers;
 mod state;
-mod step;
+pub(crate) mod step;
 mod transfer;
 mod untangle;
 

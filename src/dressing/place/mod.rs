@@ -1,13 +1,13 @@
 //! Start positions of panels: each is mapped onto a surface around the canonical body, so that seams are closed.
 
-mod hood;
-mod leg;
+pub(crate) mod hood;
+pub(crate) mod leg;
 mod outline;
 mod panels;
 mod placed_body;
 mod skirt;
-mod sleeve;
-mod trunk;
+pub(crate) mod sleeve;
+pub(crate) mod trunk;
 mod tube;
 
 pub(super) use panels::place;

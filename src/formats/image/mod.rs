@@ -2,10 +2,10 @@
 //!
 //! A size is checked against [`MAX_SIDE`], [`MAX_PIXELS`] and the number of bytes before anything is allocated.
 
-mod depth_codec;
+pub(crate) mod depth_codec;
 mod files;
 mod jpeg;
-mod limits;
+pub(crate) mod limits;
 mod png_file;
 mod sample;
 

@@ -1,8 +1,8 @@
 //! Garments from other tools.
 
-mod coarsen;
+pub(crate) mod coarsen;
 mod file;
-mod garmentcode;
+pub(crate) mod garmentcode;
 mod mesh;
 
 pub use super::flat_triangle::{unfold, widened};

@@ -2,9 +2,9 @@
 
 mod catalogue;
 mod draft;
-mod dress;
-mod skirt;
-mod top;
-mod trousers;
+pub(crate) mod dress;
+pub(crate) mod skirt;
+pub(crate) mod top;
+pub(crate) mod trousers;
 
 pub use catalogue::{dye, names, pattern};

@@ -1,8 +1,8 @@
 //! Intrinsics, depth and colour images, projection, noise models, what a sensor saw and when.
 
 mod image;
-mod intrinsics;
-mod noise;
+pub(crate) mod intrinsics;
+pub(crate) mod noise;
 
 pub use image::{ColorImage, DepthImage, ImageError};
 pub use intrinsics::{Intrinsics, IntrinsicsError};

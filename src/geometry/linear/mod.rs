@@ -1,9 +1,9 @@
 //! Sparse symmetric systems: assembly, factorisation, preconditioned iteration, with a report of how it went.
 
-mod block_matrix;
-mod cholesky;
+pub(crate) mod block_matrix;
+pub(crate) mod cholesky;
 mod coarse_space;
-mod conjugate_gradient;
+pub(crate) mod conjugate_gradient;
 mod pattern;
 mod preconditioner;
 mod row_selection;

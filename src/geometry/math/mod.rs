@@ -2,10 +2,10 @@
 
 pub mod derivative_check;
 mod element_energy;
-mod frames;
-mod lie;
+pub(crate) mod frames;
+pub(crate) mod lie;
 pub mod order_statistics;
-mod polar;
+pub(crate) mod polar;
 mod symmetric;
 
 pub use element_energy::ElementEnergy;

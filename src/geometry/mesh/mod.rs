@@ -1,13 +1,13 @@
 //! Triangle meshes and their topology, checked once at construction; normals, boundaries, isotropic remeshing, neighbour smoothing.
 
 mod distances;
-mod edges;
+pub(crate) mod edges;
 mod editable;
 mod normals;
-mod remesh;
+pub(crate) mod remesh;
 pub mod smoothing;
-mod topology;
-mod union_find;
+pub(crate) mod topology;
+pub(crate) mod union_find;
 
 pub use distances::distances;
 pub use edges::{boundary_edges, boundary_loops, edge_faces, edges, sides, undirected};

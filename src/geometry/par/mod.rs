@@ -3,7 +3,7 @@
 //! Work is cut into chunks of a fixed size, never into one chunk a thread, and partial results are
 //! combined in the order of the chunks. So sums come out the same with 1, 2 or N threads.
 
-mod lockstep;
+pub(crate) mod lockstep;
 
 pub use lockstep::lockstep;
 

@@ -6,8 +6,8 @@
 mod buffer;
 mod clip;
 mod faces;
-mod fast;
-mod hiz;
+pub(crate) mod fast;
+pub(crate) mod hiz;
 mod interpolate;
 mod kernel;
 mod options;

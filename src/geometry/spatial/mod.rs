@@ -1,12 +1,12 @@
 //! Neighbours fast: refit BVH (closest, overlap, ray parity), hash grid, kd-tree (the only file naming kiddo), organised image, each beside its brute-force oracle.
 
-mod brute;
-mod bvh;
+pub(crate) mod brute;
+pub(crate) mod bvh;
 mod chessboard;
 mod hash_grid;
-mod intersections;
+pub(crate) mod intersections;
 mod kdtree;
-mod organised;
+pub(crate) mod organised;
 mod triangle;
 
 pub use brute::nearest_brute_force;

@@ -5,9 +5,9 @@
 
 mod adapter;
 mod buffers;
-mod choice;
+pub(crate) mod choice;
 mod passes;
-mod pipelines;
+pub(crate) mod pipelines;
 mod readback;
 mod renderer;
 mod targets;

@@ -3,7 +3,7 @@
 //! The simulated shirt does not know of a hand that presses it and hangs centimetres in front. Depth cannot decide: a
 //! flat hand is as thick as the tracking error. Colour can: skin connected with the tracked hand in space is the hand.
 
-mod detect;
+pub(crate) mod detect;
 mod grid;
 mod sampling;
 

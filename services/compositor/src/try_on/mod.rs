@@ -4,7 +4,7 @@ mod drawing;
 mod handle;
 mod lifecycle;
 mod open;
-mod task;
+pub(crate) mod task;
 
 pub(crate) use handle::{Command, Handle, Setup};
 pub(crate) use open::spawn;

@@ -8,7 +8,7 @@
 
 mod box_tree;
 mod element_box;
-mod intersections;
+pub(crate) mod intersections;
 
 use super::contact_mesh::ContactMesh;
 use super::pair::ContactPair;

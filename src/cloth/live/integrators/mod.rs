@@ -4,7 +4,7 @@ pub mod collider;
 mod config;
 mod environment;
 mod explicit;
-mod implicit;
+pub(crate) mod implicit;
 mod single_patch;
 mod xpbd;
 

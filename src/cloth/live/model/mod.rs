@@ -1,10 +1,10 @@
 //! A garment as a mechanical system: sheet, membrane, bending, and its partition into bands and islands.
 
 pub(super) mod bands;
-mod bending;
-mod membrane;
+pub(crate) mod bending;
+pub(crate) mod membrane;
 pub(crate) mod partition;
-mod sheet;
+pub(crate) mod sheet;
 
 pub use bending::Hinge;
 pub use membrane::Membrane;

@@ -1,9 +1,9 @@
 //! Repair of worn garments: intersections, sleeves that lost their arm, and bodies that teleport.
 
-pub(super) mod recover_sleeves;
-pub(super) mod reference;
+pub(crate) mod recover_sleeves;
+pub(crate) mod reference;
 pub mod sleeve_rings;
 mod smooth_locally;
-pub(super) mod teleport;
-pub(super) mod untangle;
+pub(crate) mod teleport;
+pub(crate) mod untangle;
 pub mod untangler;

@@ -2,7 +2,7 @@
 
 mod collider_file;
 mod description;
-mod file;
+pub(crate) mod file;
 mod run;
 
 pub use super::integrators::collider::{Collider, Primitive};

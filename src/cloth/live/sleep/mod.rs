@@ -1,12 +1,12 @@
 //! Sleep of still cloth: the whole outfit, or islands of it while others move.
 
-mod criteria;
+pub(crate) mod criteria;
 mod follow_skin;
 pub(super) mod island_model;
-mod islands;
+pub(crate) mod islands;
 mod outfit;
 mod state;
-mod wake_source;
+pub(crate) mod wake_source;
 
 pub(super) use criteria::{is_body_still, speed_limit};
 pub(super) use islands::{BodyStep, follow_sleeping, put_islands_to_sleep, wake_islands};

@@ -4,7 +4,7 @@ mod clouds;
 mod hems;
 mod made_scenes;
 mod scenes;
-mod score;
+pub(crate) mod score;
 mod turn;
 mod variant;
 

@@ -3,14 +3,14 @@
 //! Anatomy tables describe an implicit surface; its left half is polygonised, remeshed with finer triangles in
 //! face, hands and feet, mirrored, rigged and given directions of shape.
 
-mod directions;
+pub(crate) mod directions;
 mod extremities;
-mod field;
-mod figure;
+pub(crate) mod field;
+pub(crate) mod figure;
 mod head;
 mod limbs;
 mod polygonise;
-mod rig;
+pub(crate) mod rig;
 pub mod statistics;
 mod torso;
 

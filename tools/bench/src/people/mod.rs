@@ -6,7 +6,7 @@ mod common_joints;
 mod contact_sheet;
 mod limb;
 mod person;
-mod plan;
+pub(crate) mod plan;
 mod poses;
 mod recorded;
 mod session;

@@ -30,7 +30,7 @@ mod points;
 mod random;
 mod sampling;
 mod scanner;
-mod scene;
+pub(crate) mod scene;
 mod skinned;
 mod surface;
 #[cfg(test)]

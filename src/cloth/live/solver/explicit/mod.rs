@@ -15,17 +15,17 @@ pub(crate) mod edge_stiffness;
 mod elastic;
 mod elements;
 mod filtering;
-mod fold_limit;
-mod halo;
+pub(crate) mod fold_limit;
+pub(crate) mod halo;
 mod integrate;
-mod mass_filter;
+pub(crate) mod mass_filter;
 mod patch_compile;
 mod patch_model;
 mod patch_state;
-mod simd;
-mod stability;
+pub(crate) mod simd;
+pub(crate) mod stability;
 mod stable_sheet;
-mod substeps;
+pub(crate) mod substeps;
 #[cfg(test)]
 mod test_sheets;
 #[cfg(test)]
