@@ -78,4 +78,8 @@ pub mod elastic;
 pub mod fine;
 pub mod live;
 
-pub use live::*;
+pub use live::{
+    AnchorBinding, ClothError, Config, Element, GarmentState, Hinge, Input, Model, Outfit, Sheet,
+    StagesMs, State, StepReport, Workspace, WornReference, collision_model, model, scene,
+    self_contact, sleeve_rings, solver, step, untangler,
+};

@@ -26,6 +26,8 @@ pub enum SizeState {
 pub struct Wear {
     choices: Vec<Choice>,
     outfit: DressedOutfit,
+    /// Body that the sizes were last compared with.
+    measures: Measurements,
     sizes: SizeState,
     notes: Vec<String>,
     clock: FrameClock,
@@ -52,16 +54,19 @@ impl Wear {
         is_sized: bool,
         how: PutOn,
     ) -> Result<Self, MirrorError> {
-        let sized = sized(&choices, &measure(subject.template, subject.rest)?)?;
+        let measures = measure(subject.template, subject.rest)?;
+        let sized = sized(&choices, &measures)?;
         let notes = notes(&sized);
         let outfit = DressedOutfit::put_on(subject, sized, how).map_err(MirrorError::Dress)?;
-        let sizes = match is_sized {
-            true => SizeState::Settled,
-            false => SizeState::Provisional,
+        let sizes = if is_sized {
+            SizeState::Settled
+        } else {
+            SizeState::Provisional
         };
         Ok(Self {
             choices,
             outfit,
+            measures,
             sizes,
             notes,
             clock: FrameClock::default(),
@@ -77,10 +82,12 @@ impl Wear {
         self.outfit.carry_to(subject)?;
         let is_due = is_sized && self.sizes == SizeState::Provisional;
         if is_due {
-            let sized = sized(&self.choices, &measure(subject.template, subject.rest)?)?;
-            self.sizes = match self.outfit.is_in(&sized) {
-                true => SizeState::Settled,
-                false => SizeState::Misfit,
+            self.measures = measure(subject.template, subject.rest)?;
+            let sized = sized(&self.choices, &self.measures)?;
+            self.sizes = if self.outfit.is_in(&sized) {
+                SizeState::Settled
+            } else {
+                SizeState::Misfit
             };
             self.notes = notes(&sized);
         }
@@ -100,6 +107,11 @@ impl Wear {
     /// The garments as they are put on, with their state.
     pub fn outfit(&self) -> &DressedOutfit {
         &self.outfit
+    }
+
+    /// Measures of the body that the sizes were last compared with.
+    pub fn measures(&self) -> &Measurements {
+        &self.measures
     }
 
     /// Worn sizes against those of the body.

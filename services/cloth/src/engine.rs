@@ -146,7 +146,6 @@ pub(crate) fn dress(
 ) -> Result<Worn, String> {
     let start = Instant::now();
     let rest = body.template.personalise(&body.shape);
-    let measures = measure(&body.template, &rest).map_err(|e| e.to_string())?;
     let chosen: Vec<Choice> = choices.iter().map(|c| library.choice(c)).collect();
     let how = PutOn {
         any_size: true,
@@ -161,7 +160,7 @@ pub(crate) fn dress(
         .record(start.elapsed().as_secs_f64() * 1e3);
     Ok(Worn {
         garments: garments.into(),
-        ease: ease(outfit, &measures),
+        ease: ease(outfit, wear.measures()),
         fit: FitProbe::new(&body.template, &outfit.model).map_err(|e| e.to_string())?,
         fit_age: FIT_INTERVAL,
         is_resized: false,
