@@ -13,14 +13,15 @@ use tryon::geometry::raster::{
     Cull, Options, View, VisibilityBuffer, rasterise, rasterise_reference, rasterise_with,
 };
 
-/// Adds a closed ellipsoid.
+/// Adds a closed ellipsoid of `cells` around and down.
 fn ellipsoid(
     centre: [f32; 3],
     radius: [f32; 3],
-    around: u32,
-    down: u32,
-    (v, f): &mut (Vec<P3>, Vec<Face>),
+    cells: [u32; 2],
+    v: &mut Vec<P3>,
+    f: &mut Vec<Face>,
 ) {
+    let [around, down] = cells;
     let base = v.len() as u32;
     for i in 0..=down {
         let t = std::f32::consts::PI * i as f32 / down as f32;
@@ -43,26 +44,38 @@ fn ellipsoid(
 
 /// Trunk, head, arms and legs: 13,240 vertices, 26,000 faces, as many as the paper's template.
 fn figure() -> (Vec<P3>, Vec<Face>) {
-    let mut mesh = (Vec::new(), Vec::new());
-    ellipsoid([0.0, 0.0, 2.5], [0.18, 0.32, 0.12], 60, 60, &mut mesh);
-    ellipsoid([0.0, -0.5, 2.5], [0.09, 0.13, 0.1], 40, 40, &mut mesh);
+    let (mut vertices, mut faces) = (Vec::new(), Vec::new());
+    ellipsoid(
+        [0.0, 0.0, 2.5],
+        [0.18, 0.32, 0.12],
+        [60, 60],
+        &mut vertices,
+        &mut faces,
+    );
+    ellipsoid(
+        [0.0, -0.5, 2.5],
+        [0.09, 0.13, 0.1],
+        [40, 40],
+        &mut vertices,
+        &mut faces,
+    );
     for side in [-1.0, 1.0] {
         ellipsoid(
             [side * 0.1, 0.7, 2.5],
             [0.08, 0.45, 0.08],
-            40,
-            60,
-            &mut mesh,
+            [40, 60],
+            &mut vertices,
+            &mut faces,
         );
         ellipsoid(
             [side * 0.35, 0.0, 2.5],
             [0.06, 0.4, 0.06],
-            30,
-            50,
-            &mut mesh,
+            [30, 50],
+            &mut vertices,
+            &mut faces,
         );
     }
-    mesh
+    (vertices, faces)
 }
 
 fn raster(c: &mut Criterion) {

@@ -51,5 +51,5 @@ pub use shape::{BodyShape, RestBody};
 pub use shape_space::ShapeSpace;
 pub use skeleton::{Joint, JointMotion, Skeleton};
 pub use skin_weights::SkinWeights;
-pub use skinning::{skin, skin_moved};
+pub use skinning::{MovedRest, skin, skin_moved};
 pub use template::Template;

@@ -1,7 +1,7 @@
 //! Pose blend shapes in one pose, and posing with them.
 
 use super::pose_shapes::{ENTRIES, PoseShapes};
-use super::skinning::skin_moved;
+use super::skinning::{MovedRest, skin_moved};
 use super::{BoneTransforms, Skeleton, Template};
 use nalgebra::Matrix3;
 use tryon_geometry::math::{P3, V3};
@@ -74,7 +74,11 @@ impl Template {
     pub fn pose_vertices(&self, par: Par, rest: &[P3], bones: &BoneTransforms, out: &mut Vec<P3>) {
         let offsets = self.pose_offsets(bones).map(|o| o.all(par));
         let offsets = offsets.unwrap_or_default();
-        skin_moved(par, (rest, &offsets), self.weights(), bones, out);
+        let rest = MovedRest {
+            vertices: rest,
+            offsets: &offsets,
+        };
+        skin_moved(par, rest, self.weights(), bones, out);
     }
 }
 

@@ -26,13 +26,26 @@ pub fn skin(
     bones: &BoneTransforms,
     out: &mut Vec<P3>,
 ) {
-    skin_moved(par, (rest, &[]), weights, bones, out);
+    let rest = MovedRest {
+        vertices: rest,
+        offsets: &[],
+    };
+    skin_moved(par, rest, weights, bones, out);
 }
 
-/// The same for rest vertices moved by offsets before; missing ones count as zero. Shapes `[vertices]`.
+/// Rest vertices and what they are moved by before skinning (m). Shapes `[vertices]`; missing offsets count as zero.
+#[derive(Clone, Copy, Debug)]
+pub struct MovedRest<'a> {
+    /// Rest vertices.
+    pub vertices: &'a [P3],
+    /// Their offsets.
+    pub offsets: &'a [V3],
+}
+
+/// [`skin`] of moved rest vertices.
 pub fn skin_moved(
     par: Par,
-    (rest, offsets): (&[P3], &[V3]),
+    rest: MovedRest<'_>,
     weights: &SkinWeights,
     bones: &BoneTransforms,
     out: &mut Vec<P3>,
@@ -46,6 +59,10 @@ pub fn skin_moved(
             std::array::from_fn(|c| [h[(0, c)], h[(1, c)], h[(2, c)], 0.0])
         })
         .collect();
+    let MovedRest {
+        vertices: rest,
+        offsets,
+    } = rest;
     par::map_into(par, rest.len(), 1024, out, |i| {
         let (j, w) = (&weights.joints[i], &weights.weights[i]);
         let p = offsets.get(i).map_or(rest[i], |o| rest[i] + o);

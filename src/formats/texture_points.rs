@@ -21,6 +21,17 @@ pub struct TexturePoint {
     pub color: [u8; 3],
 }
 
+/// Triangle with texture coordinates.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct TexturedFace {
+    /// Its number.
+    pub(crate) face: u32,
+    /// Corners, units of the mesh.
+    pub(crate) corners: [P3; 3],
+    /// Texture coordinates of the corners, v down.
+    pub(crate) uv: [[f32; 2]; 3],
+}
+
 /// Places of the points: evenly over the surface, no denser than the texels.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct TexturePoints {
@@ -38,15 +49,16 @@ impl TexturePoints {
         }
     }
 
-    /// Adds the points of a triangle with texture coordinates, v down; `color` is that of the mesh at a colour of the image,
+    /// Adds the points of a triangle; `color` is that of the mesh at a colour of the image,
     /// both sRGB, 0 to 255.
     pub(crate) fn add(
         &self,
-        (face, corners): (u32, [P3; 3]),
-        (image, uv): (&ColorImage, [[f32; 2]; 3]),
+        textured: &TexturedFace,
+        image: &ColorImage,
         color: impl Fn([f32; 3]) -> [f32; 3],
         out: &mut Vec<TexturePoint>,
     ) {
+        let TexturedFace { face, corners, uv } = *textured;
         let texels = (0..3).map(|k| {
             let (p, q) = (uv[k], uv[(k + 1) % 3]);
             let across = (q[0] - p[0]) * image.width() as f32;
@@ -95,7 +107,12 @@ mod tests {
         let uv = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]];
         let places = TexturePoints::over(&corners, &[[0, 1, 2]], 1);
         let mut out = Vec::new();
-        places.add((4, corners), (&image, uv), |c| c, &mut out);
+        let textured = TexturedFace {
+            face: 4,
+            corners,
+            uv,
+        };
+        places.add(&textured, &image, |c| c, &mut out);
         // 12.7 texels along the longest side.
         assert_eq!(out.len(), 13 * 13);
         for k in 0..3 {
@@ -104,9 +121,16 @@ mod tests {
         }
         assert!(out.iter().all(|p| p.color == [7, 8, 9] && p.face == 4));
         let count = out.len();
-        let lost = [corners[0], corners[1], P3::new(0.0, f32::NAN, 0.0)];
-        places.add((5, lost), (&image, uv), |c| c, &mut out);
-        places.add((6, corners), (&image, [[f32::NAN; 2]; 3]), |c| c, &mut out);
+        let lost = TexturedFace {
+            corners: [corners[0], corners[1], P3::new(0.0, f32::NAN, 0.0)],
+            ..textured
+        };
+        places.add(&lost, &image, |c| c, &mut out);
+        let unmapped = TexturedFace {
+            uv: [[f32::NAN; 2]; 3],
+            ..textured
+        };
+        places.add(&unmapped, &image, |c| c, &mut out);
         assert_eq!(out.len(), count);
     }
 }

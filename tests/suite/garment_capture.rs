@@ -31,7 +31,7 @@ fn bytes_of_npy(path: &Path) -> Vec<u8> {
 }
 
 /// F1 of some true labels against some found ones; rows with label 255 are not judged.
-fn f1(truth: &[u8], found: &[u8], (wanted, ours): (&[u8], &[u8])) -> f64 {
+fn f1(truth: &[u8], found: &[u8], wanted: &[u8], ours: &[u8]) -> f64 {
     let judged = truth.iter().zip(found).filter(|(t, _)| **t != 255);
     let (mut both, mut either) = (0.0, 0.0);
     for (t, f) in judged {
@@ -73,10 +73,10 @@ fn a_real_mans_waistcoat_shirt_and_trousers_are_found() {
     };
     let (top, under, bottom) = (part(Slot::Top), part(Slot::Under), part(Slot::Bottom));
     let scores = [
-        f1(&truth, &rows, (&[1, 2], &[top, under])),
-        f1(&truth, &rows, (&[3], &[bottom])),
-        f1(&truth, &rows, (&[1], &[top])),
-        f1(&truth, &rows, (&[2], &[under])),
+        f1(&truth, &rows, &[1, 2], &[top, under]),
+        f1(&truth, &rows, &[3], &[bottom]),
+        f1(&truth, &rows, &[1], &[top]),
+        f1(&truth, &rows, &[2], &[under]),
     ];
     println!("F1: top, trousers, waistcoat, shirt {scores:.3?}");
     assert!(0.5 * (scores[0] + scores[1]) > 0.90, "{scores:?}");
@@ -140,7 +140,7 @@ fn covered_f1(truth: &[u8], rows: &[u8]) -> f64 {
         truth.iter().map(is_covered).collect(),
         rows.iter().map(is_covered).collect(),
     );
-    f1(&t, &f, (&[1], &[1]))
+    f1(&t, &f, &[1], &[1])
 }
 
 #[test]
@@ -193,7 +193,7 @@ fn damaged_scans_are_captured_too() {
 }
 
 /// PLY text of a scan with float colours; a share of the rows has coordinates or colours that are not numbers.
-fn spoiled_ply(file: &ScanMesh, (coordinates, colors): (f32, f32), value: &str) -> String {
+fn spoiled_ply(file: &ScanMesh, coordinates: f32, colors: f32, value: &str) -> String {
     let mut rng = rand_pcg::Pcg32::seed_from_u64(6);
     let mut text = format!(
         "ply\nformat ascii 1.0\nelement vertex {}\nproperty float x\nproperty float y\nproperty float z\n\
@@ -222,8 +222,9 @@ fn coordinates_and_colours_that_are_not_numbers_are_counted_or_refused() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("spoiled.ply");
     for value in ["nan", "-inf", "1e30"] {
-        for shares in [(0.3, 0.3), (1.0, 0.0), (0.0, 1.0)] {
-            std::fs::write(&path, spoiled_ply(&file, shares, value)).expect("written");
+        for (coordinates, colors) in [(0.3, 0.3), (1.0, 0.0), (0.0, 1.0)] {
+            let spoiled = spoiled_ply(&file, coordinates, colors, value);
+            std::fs::write(&path, spoiled).expect("written");
             let scan = read_scan(&path).expect("readable");
             let found = find_frame(&template, &scan).and_then(|(frame, start)| {
                 let scan = BodyScan::new(&scan, &frame)?;
@@ -231,13 +232,13 @@ fn coordinates_and_colours_that_are_not_numbers_are_counted_or_refused() {
                 capture.start_at(start);
                 capture.frame(&scan)
             });
-            let what = format!("{value}, shares {shares:?}");
+            let what = format!("{value}, shares {coordinates} and {colors}");
             match found {
                 Ok(frame) => {
                     let left_out = frame.report.left_out.not_finite;
                     let share = left_out as f32 / file.points.len() as f32;
                     println!("{what}: {left_out} points left out");
-                    assert!((share - shares.0).abs() < 0.02, "{what}: {share}");
+                    assert!((share - coordinates).abs() < 0.02, "{what}: {share}");
                     let mut all = frame.garments.iter().flatten();
                     assert!(all.all(|p| p.iter().all(|c| c.is_finite())), "{what}");
                 }
@@ -246,7 +247,7 @@ fn coordinates_and_colours_that_are_not_numbers_are_counted_or_refused() {
                     // Finite numbers say that the scan is that large, or all but black.
                     use CaptureError::{NoGarment, NoPersonSize};
                     let is_huge = value == "1e30" && matches!(e, NoPersonSize { .. } | NoGarment);
-                    assert!(shares.0 > 0.9 || is_huge, "{what}: {e}");
+                    assert!(coordinates > 0.9 || is_huge, "{what}: {e}");
                 }
             }
         }

@@ -95,7 +95,7 @@ fn follow_with(
     for i in which {
         let mut depth = s.depth(i);
         change(i, &mut depth);
-        step_depth(&model, &mut state, (i, depth), &mut workspace);
+        step_depth(&model, &mut state, i, depth, &mut workspace);
         if i >= 30 {
             assert!(state.status.is_live(), "frame {i}: {:?}", state.status);
             sum += s.error(i, template, &joints(&model, &state));
@@ -116,7 +116,8 @@ const SEQUENCES: [(&str, usize, f64); 3] = [
 fn step_depth(
     model: &TrackerModel,
     state: &mut TrackerState,
-    (i, depth): (usize, DepthImage),
+    i: usize,
+    depth: DepthImage,
     workspace: &mut Workspace,
 ) -> StepReport {
     step(model, state, &frame(i as u64, depth), workspace).expect("step")
@@ -192,7 +193,7 @@ fn a_person_leaves_and_comes_back() {
     let (model, mut state) = tracker(&template, s.camera);
     let mut workspace = Workspace::default();
     for i in 0..40 {
-        step_depth(&model, &mut state, (i, s.depth(i)), &mut workspace);
+        step_depth(&model, &mut state, i, s.depth(i), &mut workspace);
     }
     assert!(state.status.is_live());
     let kept = state.pose.clone();
@@ -200,7 +201,8 @@ fn a_person_leaves_and_comes_back() {
         let report = step_depth(
             &model,
             &mut state,
-            (i, DepthImage::empty(640, 480)),
+            i,
+            DepthImage::empty(640, 480),
             &mut workspace,
         );
         assert_eq!(
@@ -216,7 +218,7 @@ fn a_person_leaves_and_comes_back() {
         );
     }
     for i in 55..65 {
-        step_depth(&model, &mut state, (i, s.depth(i)), &mut workspace);
+        step_depth(&model, &mut state, i, s.depth(i), &mut workspace);
     }
     assert!(state.status.is_live(), "{:?}", state.status);
     let error = s.error(64, &template, &joints(&model, &state));
@@ -245,7 +247,7 @@ fn threads_and_restarts_change_no_bit() {
                     state = state.clone();
                     workspace = Workspace::default();
                 }
-                step_depth(&model, &mut state, (i, s.depth(i)), &mut workspace);
+                step_depth(&model, &mut state, i, s.depth(i), &mut workspace);
             }
         })
         .expect("pool");
@@ -280,7 +282,7 @@ fn degenerate_frames_are_answered_without_panic() {
     .enumerate()
     {
         let depth = DepthImage::new(640, 480, data).expect("size");
-        step_depth(&model, &mut state, (i, depth), &mut workspace);
+        step_depth(&model, &mut state, i, depth, &mut workspace);
         assert_eq!(state.status, Status::Searching, "frame {i}");
         assert!(state.pose.is_finite());
     }
@@ -300,11 +302,11 @@ fn degenerate_frames_are_answered_without_panic() {
     };
     let (model, mut state) = tracker(&template, s.camera);
     for i in 0..3 {
-        step_depth(&model, &mut state, (i, s.depth(i)), &mut workspace);
+        step_depth(&model, &mut state, i, s.depth(i), &mut workspace);
     }
     state.pose.angles[3] = f64::NAN;
     for i in 3..20 {
-        step_depth(&model, &mut state, (i, s.depth(i)), &mut workspace);
+        step_depth(&model, &mut state, i, s.depth(i), &mut workspace);
     }
     assert!(
         state.status.is_live() && state.pose.is_finite(),
@@ -328,7 +330,8 @@ fn a_still_of_a_real_woman_fits() {
         last = Some(step_depth(
             &model,
             &mut state,
-            (i, depth.clone()),
+            i,
+            depth.clone(),
             &mut workspace,
         ));
     }

@@ -11,18 +11,18 @@ const BUS_JPEG_QUALITY: u8 = 80;
 pub(super) fn depth(b: &Bytes, k: &Intrinsics) -> Result<DepthImage, WireError> {
     let img =
         image::decode_depth(b).map_err(|e| WireError::new("rgbd_frame.depth", e.to_string()))?;
-    same_size("rgbd_frame.depth", (img.width(), img.height()), k)?;
+    same_size("rgbd_frame.depth", img.width(), img.height(), k)?;
     Ok(img)
 }
 
 pub(super) fn color(b: &Bytes, k: &Intrinsics) -> Result<ColorImage, WireError> {
     let img = image::decode_jpeg(b)
         .map_err(|e| WireError::new("rgbd_frame.color_jpeg", e.to_string()))?;
-    same_size("rgbd_frame.color_jpeg", (img.width(), img.height()), k)?;
+    same_size("rgbd_frame.color_jpeg", img.width(), img.height(), k)?;
     Ok(img)
 }
 
-fn same_size(field: &str, (w, h): (u32, u32), k: &Intrinsics) -> Result<(), WireError> {
+fn same_size(field: &str, w: u32, h: u32, k: &Intrinsics) -> Result<(), WireError> {
     if (w, h) == (k.width, k.height) {
         return Ok(());
     }

@@ -52,8 +52,7 @@ pub(crate) struct Job {
 
 /// One encoded picture.
 pub(crate) struct Encoded {
-    pub(crate) size: Option<(u32, u32)>,
-    pub(crate) encoding: Encoding,
+    pub(crate) format: Format,
     pub(crate) width: u32,
     pub(crate) height: u32,
     pub(crate) bytes: bytes::Bytes,
@@ -68,7 +67,10 @@ pub(crate) struct Encoded {
 impl Job {
     /// The format of a viewer, as jobs count them.
     pub(crate) fn wants(f: &PictureFormat) -> Format {
-        (f.size, Encoding::Jpeg(f.quality))
+        Format {
+            size: f.size,
+            encoding: Encoding::Jpeg(f.quality),
+        }
     }
 }
 
@@ -128,7 +130,7 @@ impl Engine {
                 posed
             })
         });
-        for size in distinct(job.formats.iter().map(|(size, _)| *size)) {
+        for size in distinct(job.formats.iter().map(|f| f.size)) {
             let input = Input {
                 frame: &job.exposure.rgbd,
                 calibration: &job.exposure.calibration,
@@ -148,7 +150,7 @@ impl Engine {
                 cost: begun.elapsed(),
                 stage: stage("compositor.render", begun),
             };
-            for format in job.formats.iter().filter(|f| f.0 == size) {
+            for format in job.formats.iter().filter(|f| f.size == size) {
                 deliver(rendered.encode(job, *format)?);
             }
             begun = Instant::now();
@@ -248,9 +250,9 @@ struct Rendered {
 }
 
 impl Rendered {
-    fn encode(&self, job: &Job, (size, encoding): Format) -> Result<Encoded, String> {
+    fn encode(&self, job: &Job, format: Format) -> Result<Encoded, String> {
         let begun = Instant::now();
-        let bytes = match encoding {
+        let bytes = match format.encoding {
             Encoding::Jpeg(quality) => encode_jpeg(&self.image, quality),
             Encoding::Png => encode_png_rgb(&self.image, Path::new("snapshot.png")),
         };
@@ -258,8 +260,7 @@ impl Rendered {
         let mut stages = before.unwrap_or(&job.exposure.stages).clone();
         stages.extend([self.stage.clone(), stage("compositor.encode", begun)]);
         Ok(Encoded {
-            size,
-            encoding,
+            format,
             width: self.image.width(),
             height: self.image.height(),
             bytes: bytes.map_err(|e| e.to_string())?.into(),

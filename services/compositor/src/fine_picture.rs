@@ -3,6 +3,7 @@
 use crate::card::Card;
 use crate::encoding::Encoding;
 use crate::engine::{Engine, Job, Placed};
+use crate::formats::Format;
 use crate::join_buffer::JoinBuffer;
 use crate::off_person;
 use crate::try_on::{Command, Handle};
@@ -172,7 +173,10 @@ impl FinePicture {
         let frame = drape(&simulation, steps).await?;
         drop(simulation);
         job.placed = Some(Arc::new(placed(&started, &frame, begun)?));
-        job.formats = vec![(None, self.encoding)];
+        job.formats = vec![Format {
+            size: None,
+            encoding: self.encoding,
+        }];
         Ok(self.draw(job).await?)
     }
 
@@ -214,7 +218,7 @@ impl FinePicture {
         let mut picture = Picture {
             frame: Some(id),
             state: TryOnState::Live.into(),
-            codec: PictureCodec::from(p.encoding).into(),
+            codec: PictureCodec::from(p.format.encoding).into(),
             width: p.width,
             height: p.height,
             image: p.bytes,

@@ -7,8 +7,13 @@ use crate::encoding::Encoding;
 use std::collections::BTreeMap;
 use tokio::time::{Duration, Instant};
 
-/// Size (pixels; `None` is the camera's) and encoding.
-pub(crate) type Format = (Option<(u32, u32)>, Encoding);
+/// Format of a picture.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) struct Format {
+    /// Pixels; `None` is the camera's.
+    pub(crate) size: Option<(u32, u32)>,
+    pub(crate) encoding: Encoding,
+}
 
 /// Share of the time that formats may take beyond the next exposure: the rate that the others lose at most. More serves
 /// large formats oftener.
@@ -74,7 +79,7 @@ impl Formats {
         let is_recent = |k: &Known| k.served.is_some_and(|t| now - t < FORGOTTEN);
         self.known
             .retain(|f, k| wanted.contains_key(f) || is_recent(k));
-        let area = |f: &Format| f.0.map_or(pixels, |(w, h)| f64::from(w) * f64::from(h));
+        let area = |f: &Format| f.size.map_or(pixels, |(w, h)| f64::from(w) * f64::from(h));
         let fresh = Known {
             cost: None,
             served: None,
@@ -145,7 +150,10 @@ mod tests {
     const LEAST: usize = 1692;
 
     fn format(w: u32, h: u32) -> Format {
-        (Some((w, h)), Encoding::Jpeg(80))
+        Format {
+            size: Some((w, h)),
+            encoding: Encoding::Jpeg(80),
+        }
     }
 
     /// Runs a minute of exposures at 30 Hz whose pictures cost 30 ns a pixel; while one is drawn, the newest waits. Times
@@ -166,7 +174,7 @@ mod tests {
             }
             free = free.max(now);
             for f in chosen {
-                let (w, h) = f.0.expect("a size");
+                let (w, h) = f.size.expect("a size");
                 let cost = Duration::from_secs_f64(f64::from(w) * f64::from(h) * 3e-8);
                 formats.record(f, cost);
                 *drawn.entry(f).or_default() += 1;

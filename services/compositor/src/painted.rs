@@ -3,6 +3,7 @@
 use crate::card::Card;
 use crate::encoding::Encoding;
 use crate::engine::{Encoded, Engine, Job, Placed};
+use crate::formats::Format;
 use crate::join_buffer::JoinBuffer;
 use std::sync::Arc;
 use tryon::formats::image::decode_jpeg;
@@ -145,7 +146,10 @@ impl Session {
             exposure,
             placed: Some(Arc::new(self.placed())),
             body: None,
-            formats: vec![(None, Encoding::Jpeg(90))],
+            formats: vec![Format {
+                size: None,
+                encoding: Encoding::Jpeg(90),
+            }],
             fit: None,
         };
         let mut drawn = Vec::new();

@@ -13,7 +13,7 @@ use nalgebra::DVector;
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 use tryon_body::parts::BodySegment;
-use tryon_body::{BodyShape, BoneTransforms, Pose, RestBody, Template, skin_moved};
+use tryon_body::{BodyShape, BoneTransforms, MovedRest, Pose, RestBody, Template, skin_moved};
 use tryon_geometry::math::{P3, V3, World};
 use tryon_geometry::par::{self, Par};
 use tryon_geometry::spatial::Bvh;
@@ -221,7 +221,10 @@ impl<'a> ModelFit<'a> {
         body.pose.bones(self.template.skeleton(), rest, bones);
         match offsets {
             Some(offsets) => {
-                let moved = (rest.vertices.as_slice(), offsets);
+                let moved = MovedRest {
+                    vertices: &rest.vertices,
+                    offsets,
+                };
                 skin_moved(Par::Rayon, moved, self.template.weights(), bones, out);
             }
             None => self

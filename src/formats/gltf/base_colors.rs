@@ -5,13 +5,22 @@ use super::srgb::{encoded, linear};
 use super::uri::external;
 use crate::TexturePoint;
 use crate::image::{decode_color, sample_texture};
-use crate::texture_points::TexturePoints;
+use crate::texture_points::{TexturePoints, TexturedFace};
 use ::gltf::{Document, Primitive, Semantic};
 use std::borrow::Cow;
 use std::path::Path;
 use tryon_geometry::camera::ColorImage;
 use tryon_geometry::math::P3;
 use tryon_geometry::mesh::Face;
+
+/// Triangles of a primitive among those of a file.
+#[derive(Clone, Copy)]
+pub(super) struct PrimitiveSurface<'a> {
+    pub(super) vertices: &'a [P3],
+    pub(super) faces: &'a [Face],
+    /// Number of its first triangle in the file.
+    pub(super) first: usize,
+}
 
 /// Reader of base colours; keeps the last texture, which neighbouring primitives share.
 pub(super) struct BaseColors<'a> {
@@ -71,9 +80,14 @@ impl<'a> BaseColors<'a> {
     pub(super) fn points_of_primitive(
         &mut self,
         p: &Primitive<'_>,
-        (vertices, faces, first): (&[P3], &[Face], usize),
+        surface: PrimitiveSurface<'_>,
         out: &mut Vec<TexturePoint>,
     ) -> Result<(), String> {
+        let PrimitiveSurface {
+            vertices,
+            faces,
+            first,
+        } = surface;
         let material = p.material();
         let pbr = material.pbr_metallic_roughness();
         let Some(info) = pbr.base_color_texture() else {
@@ -95,8 +109,12 @@ impl<'a> BaseColors<'a> {
         };
         for (f, face) in (first as u32..).zip(faces) {
             let at = face.map(|v| uv.get(v as usize).copied().unwrap_or([f32::NAN; 2]));
-            let corners = face.map(|v| vertices[v as usize]);
-            places.add((f, corners), (image, at), color, out);
+            let textured = TexturedFace {
+                face: f,
+                corners: face.map(|v| vertices[v as usize]),
+                uv: at,
+            };
+            places.add(&textured, image, color, out);
         }
         Ok(())
     }

@@ -1,7 +1,7 @@
 //! Meshes from glTF, and the same with the base colours of their vertices for scans.
 
 use super::accessors::Accessors;
-use super::base_colors::BaseColors;
+use super::base_colors::{BaseColors, PrimitiveSurface};
 use super::uri::MAX_BYTES;
 use crate::FormatError;
 use crate::TexturePoint;
@@ -349,7 +349,11 @@ impl<'a> SceneReader<'a> {
             let colors = base_colors.of_primitive(p, vertices.len());
             self.colors
                 .extend(colors.map_err(|why| fault("base colour", why))?);
-            let surface = (&vertices[..], &faces[..], first);
+            let surface = PrimitiveSurface {
+                vertices: &vertices,
+                faces: &faces,
+                first,
+            };
             base_colors
                 .points_of_primitive(p, surface, &mut self.texture)
                 .map_err(|why| fault("base colour", why))?;

@@ -5,7 +5,7 @@ use crate::FormatError;
 use crate::TexturePoint;
 use crate::image::{read_color, sample_texture};
 use crate::obj_records::ObjRecords;
-use crate::texture_points::TexturePoints;
+use crate::texture_points::{TexturePoints, TexturedFace};
 use std::collections::BTreeSet;
 use std::path::Path;
 
@@ -65,7 +65,7 @@ pub(super) fn corner_colors(
     let maps = materials.iter().flatten().filter_map(|m| m.map.as_deref());
     // One texture at a time in memory.
     for map in maps.collect::<BTreeSet<_>>() {
-        add_textured(records, &materials, map, (&mut corners, &mut points))
+        add_textured(records, &materials, map, &mut corners, &mut points)
             .map_err(|e| FormatError::field(origin, "map_Kd", e.to_string()))?;
     }
     Ok((corners.means(), points))
@@ -97,7 +97,8 @@ fn add_textured(
     records: &ObjRecords,
     materials: &[Option<&MtlMaterial>],
     map: &Path,
-    (corners, points): (&mut CornerSums, &mut Vec<TexturePoint>),
+    corners: &mut CornerSums,
+    points: &mut Vec<TexturePoint>,
 ) -> Result<(), FormatError> {
     let image = read_color(map)?;
     let places = TexturePoints::over(&records.vertices, &records.faces, 1);
@@ -110,8 +111,12 @@ fn add_textured(
         // OBJ counts v upwards from the lower border.
         let at = uv.map(|t| records.uv.get(t as usize).map(|t| [t[0], 1.0 - t[1]]));
         if let [Some(a), Some(b), Some(c)] = at {
-            let ends = face.map(|v| records.vertices[v as usize]);
-            places.add((f as u32, ends), (&image, [a, b, c]), |c| c, points);
+            let textured = TexturedFace {
+                face: f as u32,
+                corners: face.map(|v| records.vertices[v as usize]),
+                uv: [a, b, c],
+            };
+            places.add(&textured, &image, |c| c, points);
         }
         for (vertex, at) in face.iter().zip(at) {
             if let Some(color) = at.and_then(|at| sample_texture(&image, at)) {

@@ -64,7 +64,7 @@ impl CoarseSpace {
                     next as u32
                 }
             };
-            space.grow(pattern, (seed, size), &mut seeds);
+            space.grow(pattern, seed, size, &mut seeds);
         }
         space.members.resize(space.patches, Vec::new());
         for (patch, v) in space.patch.iter().zip(0..) {
@@ -79,12 +79,7 @@ impl CoarseSpace {
         self.patch[vertex as usize] == u32::MAX
     }
 
-    fn grow(
-        &mut self,
-        pattern: &BlockPattern,
-        (seed, size): (u32, usize),
-        seeds: &mut VecDeque<u32>,
-    ) {
+    fn grow(&mut self, pattern: &BlockPattern, seed: u32, size: usize, seeds: &mut VecDeque<u32>) {
         let number = self.patches as u32;
         let mut queue = VecDeque::from([seed]);
         let mut count = 0;

@@ -213,7 +213,7 @@ impl<'a> Remesher<'a> {
     /// Flips edges where that brings valences nearer to the ideal, or mends a poor angle.
     pub fn flip(&mut self) {
         for [a, b] in self.mesh.edges() {
-            if let Some(flipped) = self.mesh.flipped(a, b).filter(|f| self.improves((a, b), f)) {
+            if let Some(flipped) = self.mesh.flipped(a, b).filter(|f| self.improves(a, b, f)) {
                 for (face, new) in flipped.faces.into_iter().zip(flipped.after) {
                     self.mesh.put(face, Some(new));
                 }
@@ -221,7 +221,7 @@ impl<'a> Remesher<'a> {
         }
     }
 
-    fn improves(&self, (a, b): (u32, u32), flip: &super::editable::Flip) -> bool {
+    fn improves(&self, a: u32, b: u32, flip: &super::editable::Flip) -> bool {
         let [c, d] = flip.opposite;
         let valence = |v: u32| self.mesh.around[v as usize].len() as i32;
         let ideal = |v: u32| IDEAL_FACES[usize::from(self.border[v as usize])];

@@ -356,7 +356,7 @@ impl Bvh {
             }
             let node = &self.nodes[k as usize];
             if node.leaf != NONE {
-                self.closest_of_leaf(x, p, node.leaf, (&mut bound, &mut best));
+                self.closest_of_leaf(x, p, node.leaf, &mut bound, &mut best);
                 continue;
             }
             let children = [k + 1, self.nodes[k as usize + 1].skip];
@@ -396,7 +396,8 @@ impl Bvh {
         x: &[P3],
         p: &P3,
         leaf: u32,
-        (bound, best): (&mut f32, &mut Option<SurfacePoint>),
+        bound: &mut f32,
+        best: &mut Option<SurfacePoint>,
     ) {
         let leaf = &self.leaves[leaf as usize];
         let boxes = leaf.distances_squared(p);

@@ -81,7 +81,7 @@ fn capture(
     seed: u64,
     light: f32,
     paint: impl Fn(usize) -> (bool, [u8; 3]),
-) -> (RgbdFrame, Vec<bool>) {
+) -> CapturedArm {
     const WALL: (f32, [u8; 3]) = (3.0, [110, 115, 120]);
     const HOLES: f32 = 0.01;
     let mut rng = rand_pcg::Pcg64::seed_from_u64(seed);
@@ -109,7 +109,13 @@ fn capture(
         depth: DepthImage::new(camera.width, camera.height, depth).expect("size"),
         color: Some(ColorImage::new(camera.width, camera.height, color).expect("size")),
     };
-    (frame, arm)
+    CapturedArm { frame, arm }
+}
+
+/// Captured frame, and the pixels of the arm in it.
+struct CapturedArm {
+    frame: RgbdFrame,
+    arm: Vec<bool>,
 }
 
 pub(crate) struct Scenery {
@@ -194,7 +200,7 @@ impl Scenery {
     fn assemble(
         camera: Intrinsics,
         body: TubeMesh,
-        (frame, arm): (RgbdFrame, Vec<bool>),
+        captured: CapturedArm,
         shirt_axes: [f32; 2],
         base: [u8; 3],
     ) -> Self {
@@ -203,7 +209,7 @@ impl Scenery {
         let visible = visibility(camera, &shirt.vertices, &shirt.faces);
         Self {
             calibration: Calibration::registered(camera),
-            frame,
+            frame: captured.frame,
             body,
             limbs: Limbs::default(),
             uv: shirt.vertices.iter().map(|p| [p.x + p.z, p.y]).collect(),
@@ -212,7 +218,7 @@ impl Scenery {
                 base,
                 ..Appearance::default()
             },
-            arm,
+            arm: captured.arm,
             shirt_visible: (visible.face.iter())
                 .map(|f| *f != VisibilityBuffer::NONE)
                 .collect(),

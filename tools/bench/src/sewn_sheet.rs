@@ -45,7 +45,7 @@ impl SewnSheet {
             };
             let middle = self.middle(edge);
             if faces.len() == 1 && edge.iter().all(|v| sewn.contains(v)) {
-                let stitch = self.stitch_of(middle, edge, (&beside, &sewn));
+                let stitch = self.stitch_of(middle, edge, &beside, &sewn);
                 sewn.extend(stitch.map(|s| s.vertex));
                 self.stitches.extend(stitch);
             }
@@ -89,7 +89,8 @@ impl SewnSheet {
         &self,
         vertex: u32,
         edge: [u32; 2],
-        (beside, sewn): (&BTreeMap<[u32; 2], Vec<u32>>, &BTreeSet<u32>),
+        beside: &BTreeMap<[u32; 2], Vec<u32>>,
+        sewn: &BTreeSet<u32>,
     ) -> Option<Stitch> {
         let x = self.x[vertex as usize];
         let apart = |&[a, b]: &[u32; 2]| {

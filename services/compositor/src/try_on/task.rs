@@ -462,8 +462,7 @@ impl Task {
     fn on_done(&mut self, d: Done) {
         match d {
             Done::Picture(job, picture) => {
-                self.formats
-                    .record((picture.size, picture.encoding), picture.cost);
+                self.formats.record(picture.format, picture.cost);
                 if job.placed.is_some() == self.life.state().shows_garments() {
                     self.deliver(&job, &picture);
                 }
@@ -497,10 +496,9 @@ impl Task {
         if !is_next && self.is_shown(&job.exposure.id) {
             return;
         }
-        let wanted = (drawn.size, drawn.encoding);
         let mut viewers = std::mem::take(&mut self.viewers);
         for v in viewers.iter_mut().filter(|v| v.wants() && !v.is_behind()) {
-            if Job::wants(&v.format) == wanted {
+            if Job::wants(&v.format) == drawn.format {
                 v.picture(self.picture(job, drawn));
             }
         }
@@ -534,7 +532,7 @@ impl Task {
         let mut picture = Picture {
             frame: Some(id),
             state: state.into(),
-            codec: PictureCodec::from(p.encoding).into(),
+            codec: PictureCodec::from(p.format.encoding).into(),
             width: p.width,
             height: p.height,
             image: p.bytes.clone(),
@@ -570,7 +568,10 @@ impl Task {
             return;
         };
         let job = Job {
-            formats: vec![(None, encoding)],
+            formats: vec![Format {
+                size: None,
+                encoding,
+            }],
             ..job.clone()
         };
         self.drawing.queue_snapshot(job, answer);

@@ -186,7 +186,7 @@ fn read_faces(
         for (k, property) in element.properties.iter().enumerate() {
             let read = match property.kind {
                 PlyType::List { count, item } if Some(k) == list => {
-                    read_corners(values, (count, item), vertices, &mut corners)
+                    read_corners(values, count, item, vertices, &mut corners)
                 }
                 _ => read_property(values, property).map(|_| ()),
             };
@@ -203,7 +203,8 @@ fn read_faces(
 /// Reads the vertices of a polygon from a list with these types of count and item.
 fn read_corners(
     values: &mut PlyValues<'_>,
-    (count, item): (PlyScalar, PlyScalar),
+    count: PlyScalar,
+    item: PlyScalar,
     vertices: u32,
     corners: &mut Vec<u32>,
 ) -> Result<(), String> {

@@ -31,7 +31,8 @@ fn falling(change: impl Fn(&mut serde_json::Value)) -> StartSimulationRequest {
 async fn heights(
     c: &mut ClothServiceClient<Channel>,
     id: &str,
-    (first, count): (u32, u32),
+    first: u32,
+    count: u32,
 ) -> Vec<f64> {
     let r = FollowSimulationRequest {
         simulation_id: id.into(),
@@ -68,7 +69,7 @@ fn a_simulation_on_request_falls_as_bodies_fall() {
                 .expect("started")
                 .into_inner();
             assert_eq!((started.frame_count, started.vertex_count), (FRAMES, 4));
-            let all = heights(&mut c, &started.simulation_id, (0, FRAMES)).await;
+            let all = heights(&mut c, &started.simulation_id, 0, FRAMES).await;
             assert_eq!(all.len(), FRAMES as usize);
             for (k, y) in all.iter().enumerate() {
                 let t = k as f64 / RATE;
@@ -81,7 +82,7 @@ fn a_simulation_on_request_falls_as_bodies_fall() {
             }
             // A second reader, later and from the middle, sees the same frames.
             assert_eq!(
-                heights(&mut c, &started.simulation_id, (10, FRAMES)).await,
+                heights(&mut c, &started.simulation_id, 10, FRAMES).await,
                 all[10..]
             );
             let beyond = FollowSimulationRequest {
@@ -176,10 +177,10 @@ fn a_cancelled_simulation_continues_to_the_same_bits() {
         let resumed = c.start_simulation(rest.clone()).await.expect("resumed");
         let resumed = resumed.into_inner();
         assert_eq!(resumed.first_frame, first.next_frame);
-        let range = (first.next_frame, count);
-        let resumed = heights(&mut c, &resumed.simulation_id, range).await;
+        let from = first.next_frame;
+        let resumed = heights(&mut c, &resumed.simulation_id, from, count).await;
         let started = c.start_simulation(whole).await.expect("started");
-        let whole = heights(&mut c, &started.into_inner().simulation_id, range).await;
+        let whole = heights(&mut c, &started.into_inner().simulation_id, from, count).await;
         assert_eq!(resumed.len(), FRAMES as usize);
         assert_eq!(resumed, whole);
 

@@ -89,6 +89,6 @@ pub fn film_clouds(
 
 /// Captures one cloud and compares with its truth; the row's parameter is the rig.
 pub fn measure_cloud(scene: &CaptureScene, cell: &CloudCell, scan: TrueScan) -> Row {
-    let row = measure_scans((&scene.name, &[scan]), &CaptureVariant::whole(), 1);
+    let row = measure_scans(&scene.name, &[scan], &CaptureVariant::whole(), 1);
     row.with("rig", cell.name()).with("seed", cell.seed)
 }

@@ -13,11 +13,7 @@ const LEAST_OWN: f64 = 0.25;
 
 /// Seen part of a garment's boundary: ends and middles of its boundary edges, metres. `points` and their labels are those of
 /// the scan, `label` is the garment's.
-pub(super) fn seen_hems(
-    garment: &TrueGarment,
-    (points, labels): (&[P3], &[u8]),
-    label: u8,
-) -> Vec<P3> {
+pub(super) fn seen_hems(garment: &TrueGarment, points: &[P3], labels: &[u8], label: u8) -> Vec<P3> {
     let mut grid = HashGrid::default();
     // Searches reach half a cell. Points found twice hardly change the share.
     grid.fill(points, 2.0 * AROUND);
@@ -85,7 +81,7 @@ mod tests {
         let mut labels = vec![2; points.len()];
         labels[2] = 1;
         labels[..2].fill(1);
-        let seen = seen_hems(&square(), (&points, &labels), 1);
+        let seen = seen_hems(&square(), &points, &labels, 1);
         assert_eq!(seen, [P3::new(1.0, 0.0, 0.0), P3::new(1.0, 1.0, 0.0)]);
     }
 
@@ -100,7 +96,7 @@ mod tests {
             .iter()
             .map(|p| P3::new(p.x, p.y, 0.25))
             .collect();
-        let hems = seen_hems(&square(), (&square().vertices, &[1; 4]), 1);
+        let hems = seen_hems(&square(), &square().vertices, &[1; 4], 1);
         let found = distance_from_rings(&hems, &[ring], &lifted);
         assert!((found - 0.25).abs() < 1e-6, "{found}");
         assert_eq!(distance_from_rings(&hems, &[], &lifted), 0.0);

@@ -43,7 +43,7 @@ pub fn measure(
     bodies: usize,
 ) -> Result<Row, EvaluateError> {
     let scans = variant.scanned(&scene.scene).scans()?;
-    Ok(measure_scans((&scene.name, &scans), variant, bodies))
+    Ok(measure_scans(&scene.name, &scans, variant, bodies))
 }
 
 /// Measures variants on a scene, in order; `each` receives the rows. Scans of one resolution are made once, and variants
@@ -68,7 +68,7 @@ pub fn measure_all(
                     Some((_, scans)) => scans,
                     None => variant.scanned(&scene.scene).scans()?,
                 };
-                let row = measure_scans((&scene.name, &scans), variant, bodies);
+                let row = measure_scans(&scene.name, &scans, variant, bodies);
                 made = Some((variant.points, scans));
                 row
             }
@@ -79,11 +79,7 @@ pub fn measure_all(
     Ok(())
 }
 
-fn measure_scans(
-    (name, scans): (&str, &[TrueScan]),
-    variant: &CaptureVariant,
-    bodies: usize,
-) -> Row {
+fn measure_scans(name: &str, scans: &[TrueScan], variant: &CaptureVariant, bodies: usize) -> Row {
     let template = embedded::template();
     let row = |ms| labelled(Row::new(name, "", ms).with("scans", scans.len()), variant);
     match run(&template, scans, variant, bodies) {
@@ -198,7 +194,7 @@ fn run(
         } else {
             out.later_ms += ms / (scans.len() - 1) as f64;
         }
-        let labels = out.add((&scan, &captured), truth, share);
+        let labels = out.add(&scan, &captured, truth, share);
         if let Some(outfit) = capture.outfit() {
             out.add_garments(outfit, &captured, truth, &labels);
         }
@@ -206,7 +202,7 @@ fn run(
     }
     if let (Some((_, captured)), Some(outfit)) = (&first, capture.outfit()) {
         let mut dresser = BodyDresser::new(template.clone(), &outfit.cloth)?;
-        out.retarget(&mut dresser, (template, captured), bodies)?;
+        out.retarget(&mut dresser, template, captured, bodies)?;
     }
     Ok(out)
 }
@@ -224,7 +220,8 @@ fn mesh_of(scan: &TrueScan) -> ScanMesh {
 impl SceneRun {
     fn add(
         &mut self,
-        (scan, captured): (&BodyScan, &FrameCapture),
+        scan: &BodyScan,
+        captured: &FrameCapture,
         truth: &TrueScan,
         share: f64,
     ) -> LabelScore {
@@ -252,7 +249,7 @@ impl SceneRun {
                 continue;
             };
             let real = &truth.garments[usize::from(label) - 1];
-            let hems = seen_hems(real, (&truth.points, &truth.labels), label);
+            let hems = seen_hems(real, &truth.points, &truth.labels, label);
             let surface = &captured.alignment.surface;
             let single: Vec<P3> = part.nodes.iter().map(|v| surface[*v as usize]).collect();
             let hem = |v: &[P3]| distance_from_rings(&hems, &part.rings, v);
@@ -277,7 +274,8 @@ impl SceneRun {
     fn retarget(
         &mut self,
         dresser: &mut BodyDresser<'_>,
-        (template, captured): (&Arc<Template>, &FrameCapture),
+        template: &Arc<Template>,
+        captured: &FrameCapture,
         bodies: usize,
     ) -> Result<(), CaptureError> {
         let displacements = FrameDisplacements::of(template, captured);

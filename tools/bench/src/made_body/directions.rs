@@ -30,7 +30,11 @@ const LIMB_PROBE: f64 = 0.028;
 const TORSO_PROBE: f64 = 0.04;
 
 /// Offsets of vertices and joints for one unit.
-type Direction = (Vec<V3d>, Vec<V3d>);
+#[derive(Clone)]
+struct Direction {
+    vertices: Vec<V3d>,
+    joints: Vec<V3d>,
+}
 
 /// Source of the directions: the template without shape, its points (left and right) and mirror images.
 pub(super) struct ShapeSource<'a> {
@@ -112,10 +116,10 @@ impl ShapeSource<'_> {
     fn by_figure(&self, change: impl Fn(f64) -> Figure) -> Direction {
         let ((v1, j1), (v0, j0)) = (self.reshaped(&change(1.0)), self.reshaped(&change(-1.0)));
         let vertices = v1.iter().zip(&v0).map(|(a, b)| (a - b) * 0.5).collect();
-        (
-            self.smoothed(vertices),
-            j1.iter().zip(&j0).map(|(a, b)| (a - b) * 0.5).collect(),
-        )
+        Direction {
+            vertices: self.smoothed(vertices),
+            joints: j1.iter().zip(&j0).map(|(a, b)| (a - b) * 0.5).collect(),
+        }
     }
 
     /// Stretches bones; soles stay on the floor. Both functions give relative growth.
@@ -163,7 +167,10 @@ impl ShapeSource<'_> {
             .iter_mut()
             .chain(&mut moved)
             .for_each(|v| *v -= floor);
-        (vertices, moved)
+        Direction {
+            vertices,
+            joints: moved,
+        }
     }
 }
 
@@ -171,11 +178,12 @@ fn rest(j: &Joints) -> Vec<P3d> {
     rig::joints(j).into_iter().map(|j| j.rest).collect()
 }
 
-fn scaled((v, j): Direction, s: f64) -> Direction {
-    (
-        v.into_iter().map(|o| o * s).collect(),
-        j.into_iter().map(|o| o * s).collect(),
-    )
+fn scaled(direction: Direction, s: f64) -> Direction {
+    let scale = |all: Vec<V3d>| all.into_iter().map(|o| o * s).collect();
+    Direction {
+        vertices: scale(direction.vertices),
+        joints: scale(direction.joints),
+    }
 }
 
 /// A measure and the published deviation that one unit of a direction must change it by, metres.
@@ -256,10 +264,10 @@ pub(super) fn shape_space(source: &ShapeSource) -> Result<ShapeSpace, BodyError>
             let add = |to: &mut [V3d], by: &[V3d]| {
                 to.iter_mut().zip(by).for_each(|(a, b)| *a += b);
             };
-            add(&mut direction.0, &taller.0);
-            add(&mut direction.1, &taller.1);
+            add(&mut direction.vertices, &taller.vertices);
+            add(&mut direction.joints, &taller.joints);
         }
-        let (vertices, joints) = direction;
+        let Direction { vertices, joints } = direction;
         space.names.push((*name).to_owned());
         space
             .vertices
@@ -274,11 +282,11 @@ fn probe(source: &ShapeSource, direction: &Direction, c: f64) -> Result<Measurem
     let mut body = source.template.personalise(&BodyShape::default());
     body.vertices
         .iter_mut()
-        .zip(&direction.0)
+        .zip(&direction.vertices)
         .for_each(|(p, o)| *p += (o * c).cast::<f32>());
     body.joints
         .iter_mut()
-        .zip(&direction.1)
+        .zip(&direction.joints)
         .for_each(|(p, o)| *p += o * c);
     measure(source.template, &body).map_err(|e| BodyError::Array {
         array: "shapedirs".into(),

@@ -108,7 +108,7 @@ pub(super) fn turn(data: &Path) -> Result<Vec<Bar>, EvaluateError> {
     let template = embedded::template();
     let mut bars = Vec::new();
     for (rate, interval) in [(15, 2 * FRAME_NS), (30, FRAME_NS)] {
-        bars.extend(turn_at(&scene, &turns, &template, (rate, interval)));
+        bars.extend(turn_at(&scene, &turns, &template, rate, interval));
     }
     Ok(bars)
 }
@@ -118,7 +118,8 @@ fn turn_at(
     scene: &DepthScene,
     turns: &[Matrix3<f64>],
     template: &Arc<Template>,
-    (rate, interval): (u32, u64),
+    rate: u32,
+    interval: u64,
 ) -> Vec<Bar> {
     let mut session = TrackedSession::new(template, &scene.calibration).with_interval(interval);
     let mut first: Option<(usize, Rotation3<f64>)> = None;

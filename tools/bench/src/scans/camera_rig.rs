@@ -1,10 +1,9 @@
 //! Depth cameras around a standing subject, their frames fused to one cloud by a calibration with errors.
 
 use super::depth_camera::{Backdrop, CleanView, DepthCamera};
-use super::paint::ScenePaint;
+use super::paint::PaintedSurface;
 use super::points::{STRAY_LABEL, ScanPoints};
 use super::random::{ScanSeed, gauss};
-use super::surface::SceneSurface;
 use nalgebra::{Translation3, UnitQuaternion};
 use rand::Rng;
 use rand::seq::index::sample;
@@ -78,11 +77,11 @@ impl CameraRig {
     /// Fused cloud of at most `count` points.
     pub(super) fn scan(
         &self,
-        painted: (&SceneSurface, &ScenePaint),
+        painted: PaintedSurface<'_>,
         count: usize,
         seed: ScanSeed,
     ) -> ScanPoints {
-        let center = painted.0.center();
+        let center = painted.surface.center();
         let mut poses = seed.stage(POSES);
         let mut flights = seed.stage(SILHOUETTES);
         let mut exposures = seed.stage(EXPOSURES);

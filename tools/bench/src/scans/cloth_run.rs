@@ -36,6 +36,16 @@ impl From<Choice> for ScanGarment {
     }
 }
 
+/// Garments of a subject of scans.
+pub(super) struct ScanWardrobe<'a> {
+    /// Simulated garments.
+    pub(super) patterns: &'a [ScanGarment],
+    /// Edge length of garments cut from patterns (m).
+    pub(super) edge: f64,
+    /// Garments that move with the skin below them.
+    pub(super) skinned: &'a [SkinnedGarment],
+}
+
 /// Body and cloth in one pose of a motion.
 pub(super) struct ClothRun<'a> {
     template: &'a Template,
@@ -52,17 +62,16 @@ pub(super) struct ClothRun<'a> {
 
 impl<'a> ClothRun<'a> {
     /// Dresses a body in its first pose and lets the cloth settle for some steps of `dt` (s).
-    ///
-    /// `edge` is the edge length of garments cut from patterns (m).
     pub(super) fn new(
-        (template, rest): (&'a Template, &'a RestBody),
+        template: &'a Template,
+        rest: &'a RestBody,
         pose: &Pose<World>,
-        (garments, skinned): (&[ScanGarment], &[SkinnedGarment]),
-        (edge, dt): (f64, f64),
+        wardrobe: &ScanWardrobe<'_>,
+        dt: f64,
     ) -> Result<Self, String> {
         let gaps = (1..).map(|layer: u16| SKINNED_GAP * f32::from(layer));
-        let bound = skinned.iter().zip(gaps);
-        let bound = bound.map(|(g, gap)| g.bind((template, rest), gap));
+        let bound = wardrobe.skinned.iter().zip(gaps);
+        let bound = bound.map(|(g, gap)| g.bind(template, rest, gap));
         let mut run = Self {
             skinned: bound.collect::<Result<_, _>>()?,
             template,
@@ -73,8 +82,8 @@ impl<'a> ClothRun<'a> {
             body: Vec::new(),
             strain: 0.0,
         };
-        if !garments.is_empty() {
-            run.dressed = Some(put_on((template, rest), pose, garments, edge)?);
+        if !wardrobe.patterns.is_empty() {
+            run.dressed = Some(put_on(template, rest, pose, wardrobe)?);
             for _ in 0..SETTLING_STEPS {
                 run.step(pose, dt)?;
             }
@@ -137,14 +146,14 @@ impl<'a> ClothRun<'a> {
 
 /// Garments of any size on a body, each pattern in the size that was chosen or that fits best, meshes made to measure.
 fn put_on(
-    (template, rest): (&Template, &RestBody),
+    template: &Template,
+    rest: &RestBody,
     pose: &Pose<World>,
-    garments: &[ScanGarment],
-    edge: f64,
+    wardrobe: &ScanWardrobe<'_>,
 ) -> Result<Dressed, String> {
     let measures = measure(template, rest).map_err(|e| e.to_string())?;
     let mut patterns = Vec::new();
-    for garment in garments {
+    for garment in wardrobe.patterns {
         let sized = garment.choice.sized(&measures).map_err(|e| e.to_string())?;
         let mut pattern = sized.pattern().cloned();
         if let (Some(pattern), Some(layer)) = (&mut pattern, garment.layer) {
@@ -152,7 +161,7 @@ fn put_on(
         }
         patterns.push(pattern);
     }
-    let sources = garments.iter().zip(&patterns);
+    let sources = wardrobe.patterns.iter().zip(&patterns);
     let sources: Vec<GarmentSource<'_>> = sources
         .filter_map(|(garment, pattern)| match (&garment.choice, pattern) {
             (Choice::Mesh { garment, .. }, _) => Some(GarmentSource::Mesh(garment)),
@@ -163,6 +172,6 @@ fn put_on(
         any_size: true,
         ..DressOptions::default()
     };
-    options.triangulation.edge_length = edge;
+    options.triangulation.edge_length = wardrobe.edge;
     dress_all(template, rest, pose, &sources, &options).map_err(|e| e.to_string())
 }

@@ -1,7 +1,7 @@
 //! One colour and depth camera before the subject: frames as a sensor delivers them, with the label of each pixel.
 
 use super::STRAY_LABEL;
-use super::paint::{ScenePaint, shade};
+use super::paint::{PaintedSurface, shade};
 use super::surface::SceneSurface;
 use tryon_geometry::camera::{
     Calibration, ColorImage, DepthImage, Intrinsics, NoiseModel, RgbdFrame,
@@ -82,9 +82,10 @@ impl DepthCamera {
     /// Frame number `index` of a painted surface, `rate` a second, and the label of each pixel.
     pub(super) fn shoot(
         &self,
-        painted: (&SceneSurface, &ScenePaint),
+        painted: PaintedSurface<'_>,
         index: usize,
-        (seed, rate): (u64, f64),
+        seed: u64,
+        rate: f64,
     ) -> (RgbdFrame, Vec<u8>) {
         let clean = self.view(painted, Backdrop::Wall);
         let depth: DepthImage =
@@ -101,11 +102,8 @@ impl DepthCamera {
     }
 
     /// A painted surface in a room as a camera without noise sees it.
-    pub(super) fn view(
-        &self,
-        (surface, paint): (&SceneSurface, &ScenePaint),
-        backdrop: Backdrop,
-    ) -> CleanView {
+    pub(super) fn view(&self, painted: PaintedSurface<'_>, backdrop: Backdrop) -> CleanView {
+        let surface = painted.surface;
         let view = View::Perspective {
             camera: self.intrinsics,
             near: NEAR,
@@ -132,7 +130,7 @@ impl DepthCamera {
                     let weights = barycentrics(&view, at, pixel[0], pixel[1]);
                     let label = surface.labels[corners[0] as usize];
                     let weights = weights.unwrap_or([1.0, 0.0, 0.0]);
-                    (label, lit((surface, paint), corners, weights, &eye))
+                    (label, lit(painted, corners, weights, &eye))
                 }
                 Some(_) => {
                     let wall = *face as usize >= surface.faces.len() + 2;
@@ -151,12 +149,8 @@ impl DepthCamera {
 }
 
 /// Colour of a place on the surface, lit from fixed directions.
-fn lit(
-    (surface, paint): (&SceneSurface, &ScenePaint),
-    face: &Face,
-    weights: [f32; 3],
-    eye: &P3,
-) -> [u8; 3] {
+fn lit(painted: PaintedSurface<'_>, face: &Face, weights: [f32; 3], eye: &P3) -> [u8; 3] {
+    let PaintedSurface { surface, paint } = painted;
     let normal = SceneSurface::blend(&surface.normals, face, weights);
     let place = SceneSurface::place(&surface.drawn, face, weights);
     let normal = if normal.dot(&(eye - place)) < 0.0 {

@@ -1,6 +1,7 @@
 //! Film of a dressed subject by one depth camera, with its truth.
 
 use super::depth_camera::DepthCamera;
+use super::paint::PaintedSurface;
 use super::points::ScanPoints;
 use super::random::ScanSeed;
 use super::scene::{ScanScene, TrueScan};
@@ -31,11 +32,11 @@ impl ScanScene {
         mut each: impl FnMut(FilmedFrame) -> Result<(), EvaluateError>,
     ) -> Result<(), EvaluateError> {
         self.play(|moment| {
-            let (frame, labels) = camera.shoot(
-                (moment.surface, moment.paint),
-                moment.index,
-                (self.seed, self.rate),
-            );
+            let painted = PaintedSurface {
+                surface: moment.surface,
+                paint: moment.paint,
+            };
+            let (frame, labels) = camera.shoot(painted, moment.index, self.seed, self.rate);
             let seed = ScanSeed {
                 scene: self.seed,
                 scan: moment.index as u64,

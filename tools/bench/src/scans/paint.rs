@@ -1,6 +1,7 @@
 //! Colours of skin, hair and garments, with baked light.
 
 use super::points::{SKIN_LABEL, STRAY_LABEL};
+use super::surface::SceneSurface;
 use rand::{Rng, SeedableRng};
 use tryon_body::{RestBody, Template};
 use tryon_geometry::math::{P3, V3};
@@ -85,10 +86,18 @@ const WARMTH: [f32; 3] = [0.5, 0.0, -0.5];
 /// Brightness of a place that no camera sees, over that of an open one.
 const OCCLUDED: f32 = 0.55;
 
+/// Surface with the colours of its parts.
+#[derive(Clone, Copy)]
+pub(super) struct PaintedSurface<'a> {
+    pub(super) surface: &'a SceneSurface,
+    pub(super) paint: &'a ScenePaint,
+}
+
 impl ScenePaint {
     /// Colours of a subject with `garments` garments.
     pub(super) fn new(
-        (template, rest): (&Template, &RestBody),
+        template: &Template,
+        rest: &RestBody,
         garments: usize,
         palette: ScanPalette,
         seed: u64,

@@ -1,7 +1,7 @@
 //! Virtual body scanner: visible points or triangles of a surface, with noise.
 
 use super::camera_rig::CameraRig;
-use super::paint::{ScenePaint, tinted_shade};
+use super::paint::{PaintedSurface, ScenePaint, tinted_shade};
 use super::points::ScanPoints;
 use super::random::{ScanSeed, gauss};
 use super::sampling::{SurfaceSample, sample, visible_mesh};
@@ -58,7 +58,7 @@ impl ScannerSetting {
         seed: ScanSeed,
     ) -> ScanPoints {
         if let Some(rig) = &self.rig {
-            return rig.scan((surface, paint), self.points, seed);
+            return rig.scan(PaintedSurface { surface, paint }, self.points, seed);
         }
         let ring = ViewRing::draw(surface, surface.center());
         let openness = ring.openness(surface);

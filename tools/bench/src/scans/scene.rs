@@ -1,6 +1,6 @@
 //! Scene of a scanned, dressed, moving subject.
 
-use super::cloth_run::{ClothRun, ScanGarment};
+use super::cloth_run::{ClothRun, ScanGarment, ScanWardrobe};
 use super::defects::ScanDefects;
 use super::motion::{PoseTrack, ScanMotion};
 use super::paint::{ScanPalette, ScenePaint};
@@ -187,9 +187,9 @@ impl ScanScene {
                     seed: *seed,
                     ..first.clone()
                 };
-                let body = (&*self.actor.template, moment.rest);
-                let paint =
-                    ScenePaint::new(body, moment.run.garments().count(), self.palette, *seed);
+                let count = moment.run.garments().count();
+                let template = &self.actor.template;
+                let paint = ScenePaint::new(template, moment.rest, count, self.palette, *seed);
                 let painted = SceneMoment {
                     paint: &paint,
                     ..moment
@@ -244,19 +244,23 @@ impl ScanScene {
         let rest = template.personalise(&self.actor.shape);
         let track = PoseTrack::new(&self.actor, &self.motion, rate).map_err(fault)?;
         let mut pose = track.pose(0);
-        let (body, detail) = ((&**template, &rest), (self.edge, 1.0 / rate));
-        let garments = (&self.garments[..], &self.skinned[..]);
-        let mut run = ClothRun::new(body, &pose, garments, detail).map_err(fault)?;
+        let wardrobe = ScanWardrobe {
+            patterns: &self.garments,
+            edge: self.edge,
+            skinned: &self.skinned,
+        };
+        let dt = 1.0 / rate;
+        let mut run = ClothRun::new(template, &rest, &pose, &wardrobe, dt).map_err(fault)?;
         let count = run.garments().count();
         if count > MAX_GARMENT {
             return Err(fault(format!("{count} garments do not fit the labels")));
         }
-        let paint = ScenePaint::new(body, count, self.palette, self.seed);
+        let paint = ScenePaint::new(template, &rest, count, self.palette, self.seed);
         for index in 0..self.scans {
             if index > 0 {
                 for k in 1..=steps {
                     pose = track.pose((index as u64 - 1) * steps + k);
-                    run.step(&pose, 1.0 / rate).map_err(fault)?;
+                    run.step(&pose, dt).map_err(fault)?;
                 }
             }
             let surface = SceneSurface::new(&run, template, &rest, self.defects.has_object);

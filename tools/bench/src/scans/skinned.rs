@@ -127,7 +127,8 @@ impl SkinnedGarment {
     /// `gap` (m) at least.
     pub(super) fn bind(
         &self,
-        (template, rest): (&Template, &RestBody),
+        template: &Template,
+        rest: &RestBody,
         gap: f32,
     ) -> Result<BoundGarment, String> {
         let count = rest.vertices.len();
