@@ -22,7 +22,10 @@ use tryon::tracking::segment::part_forest::{PartForest, PartScratch, PersonCells
 use tryon::tracking::segment::{
     Contour, PersonChoice, SegmentScratch, contour, find_person, find_planes,
 };
-use tryon::tracking::{TrackerConfig, TrackerModel, TrackerState, Workspace, step};
+use tryon::tracking::{
+    RegistrationSettings, SegmentSettings, TrackerConfig, TrackerModel, TrackerState, Workspace,
+    step,
+};
 
 fn subject(routine: Routine) -> Sequence {
     let setting = Setting {
@@ -37,19 +40,28 @@ fn subject(routine: Routine) -> Sequence {
 fn segmentation(c: &mut Criterion) {
     let sequence = subject(Routine::TryOn);
     let (frame, _) = sequence.frame(0);
+    let settings = SegmentSettings::default();
     let mut grid = OrganisedCloud::new(&sequence.calibration().depth, None);
     c.bench_function("segment/sample 640x480", |b| {
         b.iter(|| grid.sample(&frame.depth, 8.0))
     });
-    c.bench_function("segment/planes", |b| b.iter(|| find_planes(&grid)));
-    let planes = find_planes(&grid);
+    c.bench_function("segment/planes", |b| {
+        b.iter(|| find_planes(&grid, &settings.planes))
+    });
+    let planes = find_planes(&grid, &settings.planes);
     let (mut scratch, mut edges) = (SegmentScratch::default(), Contour::default());
     c.bench_function("segment/person and outline", |b| {
         b.iter(|| {
             grid.sample(&frame.depth, 8.0);
-            let person = find_person(&mut grid, &planes, PersonChoice::First, &mut scratch);
+            let person = find_person(
+                &mut grid,
+                &planes,
+                PersonChoice::First,
+                &settings,
+                &mut scratch,
+            );
             grid.refine(&frame.depth, &person.cells);
-            contour(&grid, &person.cells, &mut edges);
+            contour(&grid, &person.cells, &settings, &mut edges);
             person.cells.len()
         });
     });
@@ -57,9 +69,15 @@ fn segmentation(c: &mut Criterion) {
     c.bench_function("segment/no reading at all", |b| {
         b.iter(|| {
             grid.sample(&empty, 8.0);
-            find_person(&mut grid, &planes, PersonChoice::First, &mut scratch)
-                .cells
-                .len()
+            find_person(
+                &mut grid,
+                &planes,
+                PersonChoice::First,
+                &settings,
+                &mut scratch,
+            )
+            .cells
+            .len()
         });
     });
 }
@@ -108,19 +126,21 @@ struct Readings {
 fn readings() -> Readings {
     let sequence = subject(Routine::TryOn);
     let (frame, _) = sequence.frame(0);
+    let settings = SegmentSettings::default();
     let mut grid = OrganisedCloud::new(&sequence.calibration().depth, None);
     grid.sample(&frame.depth, 8.0);
-    let planes = find_planes(&grid);
+    let planes = find_planes(&grid, &settings.planes);
     let cells = find_person(
         &mut grid,
         &planes,
         PersonChoice::First,
+        &settings,
         &mut SegmentScratch::default(),
     )
     .cells;
     grid.refine(&frame.depth, &cells);
     let mut edges = Contour::default();
-    contour(&grid, &cells, &mut edges);
+    contour(&grid, &cells, &settings, &mut edges);
     Readings {
         points: cells.iter().map(|&k| grid.points[k as usize]).collect(),
         sequence,
@@ -165,10 +185,12 @@ fn correspondences(c: &mut Criterion) {
         let config = PairingConfig {
             association,
             distance: 0.12,
-            cos_normal: 0.5,
             pull: 0.35,
             data_step: 2,
-            reuse: 0.0,
+            settings: RegistrationSettings {
+                reuse: 0.0,
+                ..RegistrationSettings::default()
+            },
         };
         c.bench_function(&format!("pairs/{name}"), |b| {
             b.iter(|| pair_surfaces(&model, &observation, &config, &mut scratch, &mut pairs));

@@ -9,13 +9,6 @@ use crate::model::TrackerModel;
 use crate::registration::Observation;
 use crate::shape::fit_displacements;
 
-/// Longest pair when the body is drawn for displacements, metres (paper, section 3.3).
-const DISPLACEMENT_DISTANCE: f32 = 0.05;
-/// Root mean square change below which displacements have settled, metres.
-const SETTLED_DISPLACEMENT: f32 = 0.4e-3;
-/// Longest interval between updates of settled displacements, frames.
-const LONGEST_INTERVAL: u32 = 24;
-
 /// Adapts the displacements to the frame of the last [`follow`](super::follow) with the same state and workspace, when
 /// they are due; the number of updated vertices. The interval doubles while they hardly change.
 pub fn adapt_surface(
@@ -23,6 +16,7 @@ pub fn adapt_surface(
     state: &mut TrackerState,
     workspace: &mut Workspace,
 ) -> usize {
+    let settings = &model.config.shape.surface;
     let Some((cells, grid)) = workspace.surface_cells.take().zip(workspace.grid.as_ref()) else {
         return 0;
     };
@@ -41,7 +35,7 @@ pub fn adapt_surface(
         observation: &observation,
     };
     let scratch = &mut workspace.fit;
-    pair(&context, &state.pose, DISPLACEMENT_DISTANCE, 0.0, scratch);
+    pair(&context, &state.pose, settings.pair_distance, 0.0, scratch);
     let (updated, change) = fit_displacements(
         &context,
         scratch,
@@ -51,8 +45,8 @@ pub fn adapt_surface(
     );
     let config = &model.config;
     let [wait, interval] = &mut state.surface_due;
-    *interval = if config.skip_settled && change < SETTLED_DISPLACEMENT {
-        (*interval * 2).min(LONGEST_INTERVAL)
+    *interval = if change < settings.settled {
+        (*interval * 2).min(settings.longest_interval)
     } else {
         config.displacement_interval.max(1)
     };

@@ -1,6 +1,7 @@
 //! Change detection: reuses the last report while the depth image differs from a reference only by sensor noise.
 
 use super::report::{StepReport, TrackingStagesMs};
+use crate::settings::ChangeSettings;
 use serde::{Deserialize, Serialize};
 use tryon_geometry::camera::DepthImage;
 use tryon_geometry::spatial::OrganisedCloud;
@@ -9,16 +10,6 @@ use tryon_geometry::spatial::OrganisedCloud;
 const BLOCK: usize = 8;
 /// Samples of a block.
 const AREA: usize = BLOCK * BLOCK;
-/// Largest change of a sample that counts, millimetres; a reading that came or went counts as this.
-const MAX_CHANGE: i32 = 30;
-/// Dead band of a block's mean depth, millimetres: a quarter of the sensor's noise at 2 m.
-const DEAD_BAND: f32 = 0.75;
-/// Normalised change (mean over its standard error and dead band) that counts: root mean square over all blocks, and of
-/// one block. A surface that moves by 1.5 [`DEAD_BAND`] exceeds the first, a hand the second.
-const CHANGED: [f32; 2] = [1.25, 5.0];
-/// Most frames in a row that reuse a report, so that motion within the noise is at most a fifth of a second late. At 0 / 5
-/// a step of a subject at rest takes 1.29 / 0.42 ms.
-const MOST_REUSED: u32 = 5;
 
 /// Blocks of a depth image and the report of that frame.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -98,10 +89,14 @@ impl DepthReference {
     }
 
     /// Report of the reference frame when `image` equals it but for noise; counts the reuse.
-    pub(super) fn reuse(&mut self, image: &DepthImage) -> Option<&StepReport> {
-        if self.reused >= MOST_REUSED
+    pub(super) fn reuse(
+        &mut self,
+        image: &DepthImage,
+        settings: &ChangeSettings,
+    ) -> Option<&StepReport> {
+        if self.reused >= settings.most_reused
             || self.columns != size(image, self.step)[0]
-            || self.has_changed(image)
+            || self.has_changed(image, settings)
         {
             return None;
         }
@@ -109,7 +104,7 @@ impl DepthReference {
         Some(&self.report)
     }
 
-    fn has_changed(&self, image: &DepthImage) -> bool {
+    fn has_changed(&self, image: &DepthImage, settings: &ChangeSettings) -> bool {
         let (mut sum, mut counted) = (0.0, 0);
         for (&block, before) in self.blocks.iter().zip(self.readings.chunks_exact(AREA)) {
             let (mut first, mut second, mut any, mut k) = (0i32, 0i32, false, 0);
@@ -119,9 +114,10 @@ impl DepthReference {
                 any |= (now | was) != 0;
                 let change = match (was, now) {
                     (0, 0) => 0,
-                    (_, 0) => MAX_CHANGE,
-                    (0, _) => -MAX_CHANGE,
-                    _ => (i32::from(now) - i32::from(was)).clamp(-MAX_CHANGE, MAX_CHANGE),
+                    (_, 0) => settings.most_change,
+                    (0, _) => -settings.most_change,
+                    _ => (i32::from(now) - i32::from(was))
+                        .clamp(-settings.most_change, settings.most_change),
                 };
                 first += change;
                 second += change * change;
@@ -131,14 +127,15 @@ impl DepthReference {
             }
             let mean = first as f32 / AREA as f32;
             let variance = (second as f32 / AREA as f32 - mean * mean).max(0.0);
-            let share = mean * mean / (variance / AREA as f32 + DEAD_BAND * DEAD_BAND);
-            if share > CHANGED[1] * CHANGED[1] {
+            let share =
+                mean * mean / (variance / AREA as f32 + settings.dead_band * settings.dead_band);
+            if share > settings.changed[1] * settings.changed[1] {
                 return true;
             }
             sum += share;
             counted += 1;
         }
-        sum > CHANGED[0] * CHANGED[0] * counted as f32
+        sum > settings.changed[0] * settings.changed[0] * counted as f32
     }
 }
 
@@ -222,7 +219,10 @@ mod tests {
             let seen = |frame, nearer, left| {
                 let first = image_of(0, sigma, lost, 0.0, 40);
                 let reference = DepthReference::of_image(&first, 2, &report());
-                reference.has_changed(&image_of(frame, sigma, lost, nearer, left))
+                reference.has_changed(
+                    &image_of(frame, sigma, lost, nearer, left),
+                    &ChangeSettings::default(),
+                )
             };
             let noisy = (1..40).filter(|f| seen(*f, 0.0, 40)).count();
             assert!(
@@ -230,7 +230,7 @@ mod tests {
                 "{noisy} of 39 images of a body at rest count as changed at {sigma} mm"
             );
             let standard_error = 2.0 * sigma / BLOCK as f32;
-            let far = DEAD_BAND + standard_error;
+            let far = ChangeSettings::default().dead_band + standard_error;
             assert!(
                 seen(50, 3.0 * far, 40),
                 "{} mm nearer at {sigma} mm",
@@ -251,17 +251,21 @@ mod tests {
                 moved.data_mut()[(v * WIDTH + u) as usize] -= 15;
             }
         }
-        assert!(reference.has_changed(&moved));
+        assert!(reference.has_changed(&moved, &ChangeSettings::default()));
     }
 
     #[test]
     fn reuse_is_bounded_and_only_blocks_of_the_cells_are_compared() {
         let first = image_of(0, 3.0, 0.0, 0.0, 40);
         let mut reference = DepthReference::of_image(&first, 2, &report());
-        let kept = (1..=MOST_REUSED + 3)
-            .filter(|_| reference.reuse(&first).is_some())
+        let kept = (1..=ChangeSettings::default().most_reused + 3)
+            .filter(|_| {
+                reference
+                    .reuse(&first, &ChangeSettings::default())
+                    .is_some()
+            })
             .count();
-        assert_eq!(kept as u32, MOST_REUSED);
+        assert_eq!(kept as u32, ChangeSettings::default().most_reused);
         let camera = tryon_geometry::camera::Intrinsics {
             width: WIDTH,
             height: HEIGHT,
@@ -274,20 +278,30 @@ mod tests {
         let mut elsewhere = first.clone();
         elsewhere.data_mut()[..2000].fill(0);
         assert!(
-            DepthReference::of_image(&first, 2, &report()).has_changed(&elsewhere)
-                && !of_person.has_changed(&elsewhere)
+            DepthReference::of_image(&first, 2, &report())
+                .has_changed(&elsewhere, &ChangeSettings::default())
+                && !of_person.has_changed(&elsewhere, &ChangeSettings::default())
         );
         // Another image size, one without a reading, and one smaller than a block.
         assert!(
             reference
                 .clone()
-                .reuse(&DepthImage::empty(80, 60))
+                .reuse(&DepthImage::empty(80, 60), &ChangeSettings::default())
                 .is_none()
         );
         let dark = DepthImage::empty(WIDTH, HEIGHT);
-        assert!(!DepthReference::of_image(&dark, 2, &report()).has_changed(&dark));
-        assert!(DepthReference::of_image(&dark, 2, &report()).has_changed(&first));
+        assert!(
+            !DepthReference::of_image(&dark, 2, &report())
+                .has_changed(&dark, &ChangeSettings::default())
+        );
+        assert!(
+            DepthReference::of_image(&dark, 2, &report())
+                .has_changed(&first, &ChangeSettings::default())
+        );
         let tiny = DepthImage::empty(5, 5);
-        assert!(!DepthReference::of_image(&tiny, 2, &report()).has_changed(&tiny));
+        assert!(
+            !DepthReference::of_image(&tiny, 2, &report())
+                .has_changed(&tiny, &ChangeSettings::default())
+        );
     }
 }

@@ -12,10 +12,6 @@ use crate::model::TrackerModel;
 use crate::shape::{KnownBody, Probation, SizeEstimate};
 use crate::start::outline;
 
-/// Difference between the heights of fitted body and readings from which they are of two persons, metres: hair, soles and
-/// the grid take 3 cm.
-const HEIGHT_TOLERANCE: f64 = 0.06;
-
 impl TrackerState {
     /// Goes on with a body that was measured before, as soon as somebody is found whom it fits; false for a state that has
     /// measured a body itself. The body must pass [`KnownBody::check`].
@@ -86,17 +82,24 @@ impl SubjectFrame<'_> {
         if probation.frames == 0 && self.has_other_height(state, workspace) {
             return true;
         }
-        let is_other = probation.compare(state.quality[1]);
+        let is_other = probation.compare(state.quality[1], &self.model.config.shape);
         state.probation = is_other.is_none().then_some(probation);
         is_other.unwrap_or(false)
     }
 
     /// The fitted body ends elsewhere than the readings along the upright. False where these do not show a whole person.
     fn has_other_height(&self, state: &TrackerState, workspace: &mut Workspace) -> bool {
+        let settings = &self.model.config.shape;
         let up = self.up.cast();
         let floor = state.world_from_camera.iso().translation.vector.y;
         let floor = state.floor_known.then_some(floor);
-        let seen = outline(&self.observation, &up, self.person.cut_below, floor);
+        let seen = outline(
+            &self.observation,
+            &up,
+            self.person.cut_below,
+            floor,
+            &self.model.config,
+        );
         let seen = seen.filter(|_| !self.person.cut_below);
         let Some(seen) = seen.and_then(|o| o.stature) else {
             return false;
@@ -106,14 +109,14 @@ impl SubjectFrame<'_> {
         let lowest = vertices.iter().map(|v| up.dot(&v.coords));
         let lowest = lowest.fold(f32::INFINITY, f32::min);
         let height = self.up.dot(&bones.joints[crown].coords) - f64::from(lowest);
-        (height - seen).abs() > HEIGHT_TOLERANCE
+        (height - seen).abs() > settings.height_tolerance
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::shape::PROBATION;
+    use crate::settings::ShapeSettings;
     use crate::status::Status;
     use crate::step::follow;
     use crate::test_scene::TestScene;
@@ -182,7 +185,7 @@ mod tests {
         let mut session = Session::before(&[]);
         assert!(session.state.know(&session.scene.model, &known));
         assert!(session.state.is_known_awaited());
-        for _ in 0..2 * PROBATION {
+        for _ in 0..2 * ShapeSettings::default().probation_frames {
             session.follow(1);
             assert_eq!(session.state.status, Status::Tracking);
             assert_eq!(
@@ -203,7 +206,7 @@ mod tests {
         for other in [[1.2, 0.0], [-1.2, 0.0], [0.0, 1.5], [0.0, -1.5]] {
             let mut session = Session::before(&other);
             session.state.know(&session.scene.model, &known);
-            session.follow(PROBATION + 6);
+            session.follow(ShapeSettings::default().probation_frames + 6);
             assert_eq!(session.state.subject, 8, "{other:?}");
             let measured = session.known().shape.coefficients;
             for (a, b) in measured.iter().zip(other) {

@@ -2,6 +2,8 @@
 //!
 //! # Ideas
 //!
+//! Settings of all stages, with units, defaults and effects: [`mod@settings`].
+//!
 //! Segmentation:
 //!
 //! - Floor by voting, background by RANSAC: [`mod@segment::plane_search`].
@@ -21,7 +23,7 @@
 //! - Projective search: [`mod@registration::index_image`].
 //! - Edge pairs: [`mod@registration::edge_pairs`].
 //! - Residuals: [`mod@registration::residual::surface`], [`mod@registration::residual::edge`],
-//!   [`mod@registration::residual::free_space`], [`mod@registration::residual::floor`],
+//!   [`mod@registration::residual::floor`],
 //!   [`mod@registration::residual::hand`], [`mod@registration::residual::clearance`],
 //!   [`mod@registration::residual::prior`].
 //! - Influence of joints on points (β of eq. 3 and 5), normal equations per bone:
@@ -30,7 +32,7 @@
 //! - Unknowns as twists (eq. 31): [`mod@registration::kinematics`].
 //! - Extrapolated poses: [`mod@fit::extrapolation`].
 //! - Iterations of eq. 12: [`mod@fit::solve`].
-//! - Annealing: [`mod@fit::schedule`].
+//! - Residual weights of each kind of fit: [`mod@fit::terms`].
 //! - First pose: [`mod@start::initial_pose`], [`mod@start::hypotheses`].
 //! - Constant-velocity start: [`mod@fit::prediction`].
 //! - Poses from proposals: [`mod@start::body_proposals`].
@@ -66,6 +68,7 @@ pub mod registration;
 mod report;
 pub mod segment;
 mod segmentation;
+mod settings;
 mod shape;
 mod start;
 mod state;
@@ -78,9 +81,16 @@ mod workspace;
 
 pub use adaptation::adapt_surface;
 pub use assess::{Agreement, ConfidenceReason, JointConfidence};
-pub use model::{PartClasses, TrackerConfig, TrackerModel, part_classes};
-pub use registration::residual::SurfaceNormals;
+pub use model::{PartClasses, TrackerModel, part_classes};
 pub use report::{Skipped, StepError, StepReport, TrackingStagesMs};
+pub use settings::{
+    AssessSettings, BeliefSettings, ChangeSettings, ConfidenceSettings, ExpectedBodySettings,
+    ExtremitySettings, FitSettings, FloorSettings, HandAssignmentSettings, HandSettings,
+    HiddenLimbSettings, HypothesisSettings, ModelSettings, PersonSettings, PlaneSettings,
+    PredictionSettings, ProposalSettings, RecoverSettings, RefusalSettings, RegistrationSettings,
+    RepairSettings, Schedule, SeatSettings, SegmentSettings, ShapeSettings, SizeSettings,
+    StandingSettings, StartSettings, StepSettings, SurfaceNormals, SurfaceSettings, TrackerConfig,
+};
 pub use shape::{KnownBody, ShapeFault, SizeEstimate, SurfaceStatistics};
 pub use start::{Facing, JointProposals, ProposedAnchor, facing, yaw_of_joints, yaw_of_trunk};
 pub use state::TrackerState;

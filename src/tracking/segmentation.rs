@@ -11,20 +11,6 @@ use crate::segment::{PersonChoice, PersonPrior, PersonSearch, contour, find_pers
 use tryon_geometry::camera::RgbdFrame;
 use tryon_geometry::spatial::OrganisedCloud;
 
-/// Frames without a subject after which the scene planes are searched again.
-const SCENE_INTERVAL: u32 = 60;
-/// Reach of the search around the last position, metres: six times a sprint between two frames.
-const REACH: f32 = 0.8;
-/// Age of a last pose up to which a lost person is searched near it alone, frames: nobody leaves and is replaced within a
-/// second.
-const RECALL: u32 = 30;
-/// Reach of that search at first, metres: somebody beside the lost person is farther away.
-const RECENT_REACH: f32 = 0.3;
-/// Its growth per frame, metres: a brisk walk.
-const WALK: f32 = 0.04;
-/// Least number of cells of a subject; fewer are a thing or noise.
-pub(super) const LEAST_CELLS: usize = 60;
-
 /// Samples the depth image into `grid` and finds the subject; refines its cells and traces its outline.
 pub(super) fn segment(
     model: &TrackerModel,
@@ -33,15 +19,16 @@ pub(super) fn segment(
     grid: &mut OrganisedCloud,
     workspace: &mut Workspace,
 ) -> PersonSearch {
+    let settings = &model.config.segment;
     if grid.sample(&frame.depth, model.config.farthest) == 0 {
         return PersonSearch::default();
     }
     state.scene_age = state.scene_age.map(|a| a.saturating_add(1));
-    if !state.status.is_live() && state.scene_age.is_none_or(|a| a >= SCENE_INTERVAL) {
-        let scene = find_planes(grid);
+    if !state.status.is_live() && state.scene_age.is_none_or(|a| a >= settings.scene_interval) {
+        let scene = find_planes(grid, &settings.planes);
         // A known floor stays known while somebody stands before it.
         if scene.floor.is_some() || state.scene_age.is_none() || state.scene.floor.is_none() {
-            state.set_scene(scene);
+            state.set_scene(scene, &model.config);
         }
     }
     let body = if state.is_following() {
@@ -52,7 +39,7 @@ pub(super) fn segment(
     };
     let prior = PersonPrior {
         centre: state.centre,
-        reach: REACH,
+        reach: settings.reach,
         body,
     };
     let choice = if state.is_following() {
@@ -60,19 +47,21 @@ pub(super) fn segment(
     } else {
         state.refusals.age();
         let is_recent = matches!(state.status, Status::Lost { .. })
-            && state.pose_age <= RECALL
+            && state.pose_age <= settings.recall
             && state.belief.verdict == Verdict::Person;
-        let reach = REACH.min(RECENT_REACH + WALK * state.pose_age as f32);
+        let reach = settings
+            .reach
+            .min(settings.recent_reach + settings.walk * state.pose_age as f32);
         PersonChoice::Untried {
             refusals: &state.refusals,
             recent: is_recent.then_some(PersonPrior { reach, ..prior }),
         }
     };
-    let mut person = find_person(grid, &state.scene, choice, &mut workspace.segment);
-    if person.cells.len() >= LEAST_CELLS {
+    let mut person = find_person(grid, &state.scene, choice, settings, &mut workspace.segment);
+    if person.cells.len() >= settings.least_cells {
         grid.refine(&frame.depth, &person.cells);
         person.cells.retain(|&c| grid.depth[c as usize] > 0.0);
-        contour(grid, &person.cells, &mut workspace.contour);
+        contour(grid, &person.cells, settings, &mut workspace.contour);
     }
     person
 }

@@ -4,11 +4,11 @@ use super::change_detection::DepthReference;
 use super::status::{LostReason, Status};
 use crate::assess::{PersonBelief, Seat, Verdict};
 use crate::fit::{FootMemory, RecentPoses};
-use crate::model::{TrackerConfig, TrackerModel};
+use crate::model::TrackerModel;
 use crate::recover::RepairTimer;
 use crate::segment::{Refusals, ScenePlanes};
+use crate::settings::TrackerConfig;
 use crate::shape::{Probation, SizeEstimate, SurfaceStatistics};
-use crate::start::ASSUMED_HEIGHT;
 use nalgebra::{UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
 use tryon_body::{BodyShape, Pose};
@@ -97,7 +97,8 @@ impl TrackerState {
     /// State before the first frame.
     pub fn new(model: &TrackerModel) -> Self {
         let root = Rigid::from_parts(START, facing_camera());
-        let world_from_camera = ScenePlanes::default().world_from_camera(ASSUMED_HEIGHT);
+        let world_from_camera =
+            ScenePlanes::default().world_from_camera(model.config.start.assumed_height);
         Self {
             status: Status::Searching,
             pose: Pose::rest(model.template().skeleton(), root),
@@ -141,7 +142,7 @@ impl TrackerState {
         self.status = Status::Lost {
             reason: LostReason::NoPerson,
         };
-        self.belief = PersonBelief::given();
+        self.belief = PersonBelief::given(&model.config.assess.belief);
         self.centre = P3::from(root.cast::<f32>());
         self.before = None;
         self.reference = None;
@@ -161,9 +162,9 @@ impl TrackerState {
             ..fresh
         };
     }
-    pub(super) fn set_scene(&mut self, scene: ScenePlanes) {
+    pub(super) fn set_scene(&mut self, scene: ScenePlanes, config: &TrackerConfig) {
         self.floor_known = scene.floor.is_some();
-        self.world_from_camera = scene.world_from_camera(ASSUMED_HEIGHT);
+        self.world_from_camera = scene.world_from_camera(config.start.assumed_height);
         self.scene = scene;
         self.scene_age = Some(0);
     }

@@ -3,13 +3,13 @@
 use super::adaptation::adapt_surface;
 use super::change_detection::DepthReference;
 use super::report::{StepError, StepReport, Stopwatch};
-use super::segmentation::{LEAST_CELLS, segment};
+use super::segmentation::segment;
 use super::state::TrackerState;
 use super::status::{LostReason, Status};
 use super::subject::{StepLog, SubjectFrame};
 use super::workspace::Workspace;
 use crate::assess::Verdict;
-use crate::fit::{AT_REST, motion};
+use crate::fit::motion;
 use crate::model::TrackerModel;
 use crate::registration::Observation;
 use crate::segment::{CandidateBox, PersonSearch};
@@ -17,14 +17,6 @@ use crate::start::rolled_camera;
 use nalgebra::Vector3;
 use tryon_geometry::camera::{DepthImage, RgbdFrame};
 use tryon_geometry::spatial::OrganisedCloud;
-
-/// Motion per frame below which a fit is at rest, metres, and such frames in a row before frames are compared. A fit creeps
-/// for a dozen frames (an arm along the view by 0.3 mm each), and would do so in jerks.
-const RESTING: f64 = 2.0 * AT_REST;
-/// See [`RESTING`].
-const RESTING_FRAMES: u32 = 15;
-/// Stride of the change detection over the grid of an empty scene.
-const EMPTY_STRIDE: u32 = 2;
 
 /// Tracks one frame. On success the state holds the newest pose and status. A frame without a usable subject keeps the
 /// last good pose and its reason.
@@ -61,7 +53,7 @@ pub fn follow(
     check(model, state, frame)?;
     workspace.surface_cells = None;
     let mut watch = Stopwatch::start();
-    if let Some(mut report) = reuse(state, frame) {
+    if let Some(mut report) = reuse(model, state, frame) {
         report.stages_ms.segment = watch.lap();
         return Ok(report);
     }
@@ -72,7 +64,7 @@ pub fn follow(
     state.frames += 1;
     let person = segment(model, state, frame, &mut grid, workspace);
     let mut log = StepLog::new(state, &grid, &person, watch);
-    let nobody = person.cells.len() < LEAST_CELLS;
+    let nobody = person.cells.len() < model.config.segment.least_cells;
     if nobody {
         lose(state, LostReason::NoPerson);
     } else {
@@ -100,12 +92,13 @@ pub fn follow(
             Ok(()) => {
                 let is_tested = state.belief.verdict != Verdict::Unsure;
                 if let Some(candidate) = person.candidate.filter(|_| is_tested) {
-                    state.refusals.forget(&candidate);
+                    let settings = &model.config.segment.refusals;
+                    state.refusals.forget(&candidate, settings);
                 }
             }
             Err(reason) => {
                 if let Some(candidate) = person.candidate {
-                    refuse(state, candidate, reason);
+                    refuse(model, state, candidate, reason);
                 }
                 lose(state, reason);
             }
@@ -116,27 +109,45 @@ pub fn follow(
     report.status = state.status;
     report.pose_age = state.pose_age;
     if model.config.skip_unchanged {
-        state.reference = reference(model, state, (&frame.depth, &grid), &person, &report);
+        let segmented = SegmentedFrame {
+            depth: &frame.depth,
+            grid: &grid,
+            person: &person,
+        };
+        state.reference = segmented.reference(model, state, &report);
     }
     workspace.grid = Some(grid);
     Ok(report)
 }
 
-/// Reference of later frames, which are skipped while nothing changes.
-fn reference(
-    model: &TrackerModel,
-    state: &mut TrackerState,
-    (depth, grid): (&DepthImage, &OrganisedCloud),
-    person: &PersonSearch,
-    report: &StepReport,
-) -> Option<DepthReference> {
-    if person.cells.len() >= LEAST_CELLS {
-        return is_at_rest(model, state)
-            .then(|| DepthReference::of_cells(depth, grid, &person.cells, report));
+/// Frame with its grid and the person in it.
+struct SegmentedFrame<'a> {
+    depth: &'a DepthImage,
+    grid: &'a OrganisedCloud,
+    person: &'a PersonSearch,
+}
+
+impl SegmentedFrame<'_> {
+    /// Reference of later frames, which are skipped while nothing changes.
+    fn reference(
+        &self,
+        model: &TrackerModel,
+        state: &mut TrackerState,
+        report: &StepReport,
+    ) -> Option<DepthReference> {
+        let Self {
+            depth,
+            grid,
+            person,
+        } = self;
+        if person.cells.len() >= model.config.segment.least_cells {
+            return is_at_rest(model, state)
+                .then(|| DepthReference::of_cells(depth, grid, &person.cells, report));
+        }
+        // A waiting candidate is tried again though nothing changes.
+        let step = model.config.step.empty_stride * grid.stride();
+        (person.rivals == 0).then(|| DepthReference::of_image(depth, step, report))
     }
-    // A waiting candidate is tried again though nothing changes.
-    (person.rivals == 0)
-        .then(|| DepthReference::of_image(depth, EMPTY_STRIDE * grid.stride(), report))
 }
 
 fn check(model: &TrackerModel, state: &TrackerState, frame: &RgbdFrame) -> Result<(), StepError> {
@@ -178,8 +189,10 @@ fn check(model: &TrackerModel, state: &TrackerState, frame: &RgbdFrame) -> Resul
 }
 
 /// Report of a frame without change: pose and report of the reference frame hold.
-fn reuse(state: &mut TrackerState, frame: &RgbdFrame) -> Option<StepReport> {
-    let mut report = state.reference.as_mut()?.reuse(&frame.depth)?.clone();
+fn reuse(model: &TrackerModel, state: &mut TrackerState, frame: &RgbdFrame) -> Option<StepReport> {
+    let settings = &model.config.step.change;
+    let reference = state.reference.as_mut()?;
+    let mut report = reference.reuse(&frame.depth, settings)?.clone();
     state.frames += 1;
     state.scene_age = state.scene_age.map(|a| a.saturating_add(1));
     if !state.status.is_live() {
@@ -195,10 +208,11 @@ fn reuse(state: &mut TrackerState, frame: &RgbdFrame) -> Option<StepReport> {
 
 /// True when the subject rests in a settled pose, so that an unchanged frame has the same result; counts such frames.
 fn is_at_rest(model: &TrackerModel, state: &mut TrackerState) -> bool {
+    let settings = &model.config.step;
     let moved = state.before.as_ref().map_or(f64::MAX, |b| {
         motion(model.template.skeleton(), b, &state.pose)
     });
-    state.still = if moved < RESTING {
+    state.still = if moved < settings.resting {
         state.still.saturating_add(1)
     } else {
         0
@@ -206,17 +220,25 @@ fn is_at_rest(model: &TrackerModel, state: &mut TrackerState) -> bool {
     state.status == Status::Tracking
         && state.calibrated(&model.config)
         && state.bad_frames == 0
-        && state.still >= RESTING_FRAMES
-        && moved < AT_REST
+        && state.still >= settings.resting_frames
+        && moved < model.config.fit.prediction.at_rest
 }
 
 /// Remembers a candidate that was refused, and what spoke against it.
-fn refuse(state: &mut TrackerState, candidate: CandidateBox, reason: LostReason) {
+fn refuse(
+    model: &TrackerModel,
+    state: &mut TrackerState,
+    candidate: CandidateBox,
+    reason: LostReason,
+) {
+    let settings = &model.config.segment.refusals;
     let log_odds = match reason {
         LostReason::Disagreement => state.belief.log_odds,
-        _ => state.refusals.log_odds(&candidate),
+        _ => state.refusals.log_odds(&candidate, settings),
     };
-    state.refusals.record(candidate, log_odds.min(0.0));
+    state
+        .refusals
+        .record(candidate, log_odds.min(0.0), settings);
 }
 
 fn lose(state: &mut TrackerState, reason: LostReason) {

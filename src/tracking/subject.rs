@@ -8,9 +8,8 @@ use crate::assess::{
     Agreement, JointConfidence, PersonBelief, PersonEvidence, Seat, Verdict, confidence, sits,
 };
 use crate::fit::{
-    ANNEAL, FitContext, FitReport, FitTerms, FloorStance, FootMemory, HiddenKnees, Prediction,
-    START, START_TERMS, Schedule, TRACK, assign_hands, filter_pose, fit_pose, floor_below,
-    highest_hips, predict,
+    FitContext, FitReport, FitTerms, FloorStance, FootMemory, HiddenKnees, PoseFilter, Prediction,
+    assign_hands, fit_pose, floor_below, highest_hips, predict,
 };
 use crate::model::{PersonalBody, TrackerModel};
 use crate::recover::{HiddenLimb, Repair};
@@ -18,6 +17,7 @@ use crate::registration::Observation;
 use crate::registration::residual::FloorPlane;
 use crate::segment::PersonSearch;
 use crate::segment::part_forest::PartScratch;
+use crate::settings::{Schedule, StepSettings};
 use crate::shape::{SizeCalibration, SizeEstimate, first_shapes};
 use crate::start::{BodyProposals, StartPrior, initial_pose, outline, person_cells};
 use nalgebra::Vector3;
@@ -26,33 +26,6 @@ use tryon_body::{BodyShape, BoneTransforms, Pose};
 use tryon_geometry::camera::RgbdFrame;
 use tryon_geometry::math::{Camera, P3};
 use tryon_geometry::spatial::OrganisedCloud;
-
-/// Share of explained readings below which a frame is bad.
-const LEAST_EXPLAINED: f64 = 0.45;
-/// Share of visible points with a reading below which a frame is bad.
-const LEAST_MATCHED: f64 = 0.35;
-/// Share of the area above which body and frame disagree; see docs/decisions/043. Good tracks stay below 0.16.
-const MOST_WRONG: f32 = 0.2;
-/// Share of a hidden arm in free space above which it is put behind the readings. At 0.2 a forearm that is hidden for three
-/// frames is torn away (jacks 10.7 instead of 8.0 mm), at 0.45 arms come back late (9.0 mm).
-const ARM_IN_AIR: f32 = 0.3;
-/// Share of the elbow's angle that no reading holds from which on a forearm is hidden: visible ones stay below 0.2 (jacks),
-/// hidden ones are above 0.99.
-const HIDDEN: f64 = 0.9;
-/// Share of a hidden arm that may be without return: 0.1 at most on recordings, 0.17 and more where a dark sleeve is before a wall.
-const MOST_UNKNOWN: f32 = 0.13;
-/// Share of the area that may be uncovered meanwhile: an arm that is lost leaves readings uncovered where it is.
-const MOST_UNCOVERED: f32 = 0.02;
-/// Frames in doubt before the search begins anew.
-const DOUBT: u32 = 2;
-/// Age of a last pose up to which it tells front from back at the next start, frames.
-const RECENT: u32 = 15;
-/// Bad frames in a row that lose the subject.
-const PATIENCE: u32 = 8;
-/// Frames without the subject after which the next one is measured anew.
-const FORGET: u32 = 150;
-/// Residual that halves the quality of a frame, metres.
-const POOR_RESIDUAL: f64 = 0.02;
 
 /// Report in progress, with the stopwatch of its stages.
 pub(super) struct StepLog {
@@ -94,6 +67,7 @@ impl StepLog {
     }
 
     fn add_fit(&mut self, model: &TrackerModel, state: &TrackerState, fit: &FitReport) {
+        let settings = &model.config.step;
         let report = &mut self.report;
         report.iterations = fit.iterations;
         report.converged = fit.converged;
@@ -101,13 +75,29 @@ impl StepLog {
         report.residual_mm = fit.residual * 1e3;
         report.explained = fit.explained;
         report.matched = fit.matched;
-        report.quality = fit.explained.min(fit.matched) / (1.0 + fit.residual / POOR_RESIDUAL);
+        report.quality =
+            fit.explained.min(fit.matched) / (1.0 + fit.residual / settings.poor_residual);
         report.skipped.hidden_points = fit.pairs.hidden;
         report.skipped.inconsistent_pairs = fit.pairs.inconsistent;
         report.skipped.searches = fit.pairs.reused;
-        report.skipped.iterations = model.config.iterations.saturating_sub(fit.iterations);
+        report.skipped.iterations = model
+            .config
+            .fit
+            .track
+            .iterations
+            .saturating_sub(fit.iterations);
         report.skipped.displacements = state.shape.displacements.len();
     }
+}
+
+/// Occasion of a test of the subject.
+struct PersonTest {
+    /// The subject was just found.
+    found: bool,
+    /// The cells are classified already.
+    classified: bool,
+    /// Share of the body's visible points with a reading.
+    matched: f32,
 }
 
 /// A subject in view and the frame that shows it.
@@ -136,6 +126,7 @@ impl SubjectFrame<'_> {
         workspace: &mut Workspace,
         log: &mut StepLog,
     ) -> Result<(), LostReason> {
+        let settings = &self.model.config.step;
         let config = &self.model.config;
         workspace.fit.pairing.forget();
         let found = !state.is_following();
@@ -149,16 +140,16 @@ impl SubjectFrame<'_> {
         let expected = (!found && config.calm > 0.0).then(|| state.pose.clone());
         let mut pose = start.pose;
         let schedule = Schedule {
-            iterations: config.iterations,
-            ahead: if start.is_fine { ANNEAL } else { 0 },
-            ..TRACK
+            ahead: if start.is_fine { config.fit.anneal } else { 0 },
+            ..config.fit.track
         };
         log.report.skipped.coarse_iterations = schedule.ahead;
-        let first = if found { &START } else { &schedule };
+        let first = if found { &config.fit.start } else { &schedule };
         let mut fit = self.fit(&mut pose, first, workspace);
         log.report.stages_ms.pose = log.watch.lap();
-        let good =
-            fit.explained >= LEAST_EXPLAINED && fit.matched >= LEAST_MATCHED && pose.is_finite();
+        let good = fit.explained >= settings.least_explained
+            && fit.matched >= settings.least_matched
+            && pose.is_finite();
         if good && !state.calibrated(config) {
             let adapted = self.calibrate(state, &mut pose, &schedule, workspace);
             fit = adapted.unwrap_or(fit);
@@ -169,13 +160,17 @@ impl SubjectFrame<'_> {
             return Err(LostReason::NotFinite);
         }
         if let Some(expected) = expected.filter(|_| good) {
-            let rest = &workspace.body.rest;
-            let uncertainty = config.calm * fit.residual;
-            let drift = &mut state.drift;
-            pose = filter_pose(self.model, rest, (&expected, &pose), uncertainty, drift);
+            let filter = PoseFilter {
+                model: self.model,
+                rest: &workspace.body.rest,
+                last: &expected,
+                fitted: &pose,
+                uncertainty: config.calm * fit.residual,
+            };
+            pose = filter.filter(&mut state.drift);
         }
         state.bad_frames = if good { 0 } else { state.bad_frames + 1 };
-        if state.bad_frames > PATIENCE {
+        if state.bad_frames > settings.patience {
             return Err(LostReason::Residual);
         }
         self.assess(&pose, workspace, log);
@@ -184,14 +179,16 @@ impl SubjectFrame<'_> {
         }
         let mut classified = found;
         if config.rescue {
-            classified |= self.repair(state, workspace, (&mut pose, &mut fit), log);
+            classified |= self.repair(state, workspace, &mut pose, &mut fit, log);
         }
-        if config.judge {
-            self.test_person(state, workspace, &pose, (found, classified, fit.matched));
-        }
-        let agrees = !config.judge || log.report.agreement.wrong() <= MOST_WRONG;
-        let is_nobody = config.judge && state.belief.verdict == Verdict::Nobody;
-        if is_nobody || found && !agrees {
+        let test = PersonTest {
+            found,
+            classified,
+            matched: fit.matched as f32,
+        };
+        self.test_person(state, workspace, &pose, &test);
+        let agrees = log.report.agreement.wrong() <= settings.most_wrong;
+        if state.belief.verdict == Verdict::Nobody || found && !agrees {
             if let Some(before) = before {
                 (state.size, state.shape) = before;
             }
@@ -199,8 +196,8 @@ impl SubjectFrame<'_> {
         }
         let status = state.status;
         state.subject += u64::from(is_new);
-        self.commit(state, workspace, pose, (&fit, &log.report.confidence));
-        count_doubt(state, agrees)?;
+        self.commit(state, workspace, pose, &fit, &log.report.confidence);
+        count_doubt(state, agrees, settings)?;
         if state.belief.verdict == Verdict::Unsure {
             state.status = status;
         }
@@ -240,6 +237,7 @@ impl SubjectFrame<'_> {
     /// Puts arms in free space that no reading holds behind the readings while these are all covered, where that brings them
     /// out of it. An arm in a sleeve without return stays: that looks like free space, too.
     fn hide_arms(&self, pose: &mut Pose<Camera>, workspace: &mut Workspace, log: &mut StepLog) {
+        let settings = &self.model.config.recover.hidden;
         let parts = [BodyPart::LeftArm, BodyPart::RightArm];
         for (side, part) in parts.into_iter().enumerate() {
             let Some(limb) = &self.model.arms[side] else {
@@ -248,9 +246,11 @@ impl SubjectFrame<'_> {
             let before = log.report.agreement;
             let in_air = before.parts[part as usize];
             let has_hand = workspace.fit.terms.hands[side].is_some();
-            let is_dark = has_hand || before.unknown[part as usize] > MOST_UNKNOWN;
-            let is_hidden = limb.is_hinge_unseen(&workspace.fit.unseen, HIDDEN) && !is_dark;
-            if !is_hidden || before.uncovered > MOST_UNCOVERED || in_air < ARM_IN_AIR {
+            let is_dark = has_hand || before.unknown[part as usize] > settings.most_unknown;
+            let is_hidden =
+                limb.is_hinge_unseen(&workspace.fit.unseen, settings.unseen) && !is_dark;
+            if !is_hidden || before.uncovered > settings.most_uncovered || in_air < settings.in_air
+            {
                 continue;
             }
             let context = self.context(&workspace.body);
@@ -260,7 +260,9 @@ impl SubjectFrame<'_> {
             };
             self.assess(&moved, workspace, log);
             let after = &log.report.agreement;
-            if after.uncovered <= MOST_UNCOVERED && after.parts[part as usize] < 0.5 * in_air {
+            if after.uncovered <= settings.most_uncovered
+                && after.parts[part as usize] < 0.5 * in_air
+            {
                 *pose = moved;
             } else {
                 self.assess(pose, workspace, log);
@@ -275,18 +277,25 @@ impl SubjectFrame<'_> {
         workspace: &mut Workspace,
         log: &mut StepLog,
     ) -> Result<Prediction, LostReason> {
-        workspace.fit.terms = START_TERMS;
-        if state.pose_age > FORGET {
+        let settings = &self.model.config.step;
+        workspace.fit.terms = FitTerms::start(&self.model.config.fit);
+        if state.pose_age > settings.forget {
             state.reset(self.model);
         }
         let camera_height = state.world_from_camera.iso().translation.vector.y;
         let floor = state.floor_known.then_some(camera_height);
         let up = self.up.cast();
-        let outline = outline(&self.observation, &up, self.person.cut_below, floor);
+        let outline = outline(
+            &self.observation,
+            &up,
+            self.person.cut_below,
+            floor,
+            &self.model.config,
+        );
         let is_unknown = state.size.frames == 0 && self.model.config.adapt_size;
         let stature = outline.and_then(|o| o.stature).filter(|_| is_unknown);
         let shapes = first_shapes(self.model, stature, &state.shape);
-        let is_recent = state.status != Status::Searching && state.pose_age <= RECENT;
+        let is_recent = state.status != Status::Searching && state.pose_age <= settings.recent;
         let recent = is_recent.then_some(state.pose.root.iso().rotation);
         let proposals = self.proposals(&mut workspace.parts);
         let prior = StartPrior {
@@ -298,7 +307,7 @@ impl SubjectFrame<'_> {
             workspace.body.update(self.model, &shape);
             let (context, scratch) = (self.context(&workspace.body), &mut workspace.fit);
             let (pose, fit) = initial_pose(&context, &outline?, &prior, scratch)?;
-            (fit.explained >= LEAST_EXPLAINED).then_some((fit.cost, pose, shape))
+            (fit.explained >= settings.least_explained).then_some((fit.cost, pose, shape))
         });
         let best = starts.min_by(|a, b| a.0.total_cmp(&b.0));
         log.report.stages_ms.place = log.watch.lap();
@@ -325,11 +334,13 @@ impl SubjectFrame<'_> {
         &self,
         state: &mut TrackerState,
         workspace: &mut Workspace,
-        (pose, fit): (&mut Pose<Camera>, &mut FitReport),
+        pose: &mut Pose<Camera>,
+        fit: &mut FitReport,
         log: &mut StepLog,
     ) -> bool {
-        let disagrees = state.repair.is_due(&log.report.agreement);
-        if !disagrees && !state.repair.is_check_due() {
+        let settings = &self.model.config.recover.repair;
+        let disagrees = state.repair.is_due(&log.report.agreement, settings);
+        if !disagrees && !state.repair.is_check_due(settings) {
             return false;
         }
         let proposals = self.proposals(&mut workspace.parts);
@@ -343,7 +354,7 @@ impl SubjectFrame<'_> {
             pose,
             agreement: log.report.agreement,
             is_contradicted,
-            is_stuck: state.repair.is_stuck(),
+            is_stuck: state.repair.is_stuck(settings),
         };
         let repaired = repair.search(&mut workspace.fit, &mut workspace.agreement);
         let found = repaired.is_some();
@@ -354,7 +365,9 @@ impl SubjectFrame<'_> {
             let context = self.context(&workspace.body);
             log.report.confidence = confidence(&context, pose, &workspace.fit, &better.agreement);
         }
-        state.repair.record(found, log.report.agreement.wrong());
+        state
+            .repair
+            .record(found, log.report.agreement.wrong(), settings);
         log.report.stages_ms.place += log.watch.lap();
         true
     }
@@ -365,12 +378,12 @@ impl SubjectFrame<'_> {
         state: &mut TrackerState,
         workspace: &mut Workspace,
         pose: &Pose<Camera>,
-        (found, classified, matched): (bool, bool, f64),
+        test: &PersonTest,
     ) {
-        if !classified && state.belief.verdict != Verdict::Unsure {
+        if !test.classified && state.belief.verdict != Verdict::Unsure {
             return;
         }
-        if !classified {
+        if !test.classified {
             let person = person_cells(&self.observation, &self.up);
             self.model.forest.classify(&person, &mut workspace.parts);
         }
@@ -378,13 +391,16 @@ impl SubjectFrame<'_> {
         scratch.draw(&self.context(&workspace.body), pose);
         let (image, map) = (&scratch.pairing.image, &workspace.parts.map);
         let (model, observation) = (self.model, &self.observation);
-        let evidence = PersonEvidence::measure(model, observation, image, map, matched as f32);
-        if found {
+        let evidence = PersonEvidence::measure(model, observation, image, map, test.matched);
+        let config = &model.config;
+        let settings = &config.assess.belief;
+        if test.found {
             let candidate = self.person.candidate.as_ref();
-            let refused = candidate.map_or(0.0, |c| state.refusals.log_odds(c));
-            state.belief = PersonBelief::start(refused);
+            let refusals = &config.segment.refusals;
+            let refused = candidate.map_or(0.0, |c| state.refusals.log_odds(c, refusals));
+            state.belief = PersonBelief::start(refused, settings);
         }
-        state.belief.update(evidence);
+        state.belief.update(evidence, settings);
     }
 
     /// Sets the residuals of a tracked frame and predicts its pose.
@@ -448,7 +464,8 @@ impl SubjectFrame<'_> {
         state: &mut TrackerState,
         workspace: &Workspace,
         pose: Pose<Camera>,
-        (fit, confidence): (&FitReport, &[JointConfidence]),
+        fit: &FitReport,
+        confidence: &[JointConfidence],
     ) {
         let skeleton = self.model.template.skeleton();
         let found = !state.is_following();
@@ -461,13 +478,14 @@ impl SubjectFrame<'_> {
         state.quality = [fit.explained, fit.residual];
         let joints = &workspace.fit.bones.joints;
         let sits = sits(self.model, &self.up, joints, confidence);
-        state.seat.update(sits);
+        state.seat.update(sits, &self.model.config.assess.seat);
         state.status = state.live_status(&self.model.config);
         state.highest_hips = highest_hips(self.model, &self.up, state.highest_hips, joints);
         let mut bones = BoneTransforms::default();
         state.pose.bones(skeleton, &workspace.body.rest, &mut bones);
         let feet = FootMemory::of(self.model, &bones.joints);
-        state.feet = Some(state.feet.map_or(feet, |kept| kept.updated(feet)));
+        let standing = &self.model.config.fit.standing;
+        state.feet = Some(state.feet.map_or(feet, |kept| kept.updated(feet, standing)));
     }
 
     /// Counts down to the next adaptation of the surface; true when it is due.
@@ -493,10 +511,14 @@ fn size_before(state: &TrackerState, found: bool) -> Option<(SizeEstimate, BodyS
 }
 
 /// Counts frames in doubt: their pose is followed, but not live.
-fn count_doubt(state: &mut TrackerState, agrees: bool) -> Result<(), LostReason> {
+fn count_doubt(
+    state: &mut TrackerState,
+    agrees: bool,
+    settings: &StepSettings,
+) -> Result<(), LostReason> {
     let reason = LostReason::Disagreement;
     state.disagreeing = if agrees { 0 } else { state.disagreeing + 1 };
-    if state.disagreeing > DOUBT {
+    if state.disagreeing > settings.doubt {
         return Err(reason);
     }
     if !agrees {

@@ -2,9 +2,10 @@
 
 use super::state::TrackerState;
 use crate::fit::FitContext;
-use crate::model::{PersonalBody, TrackerConfig, TrackerModel};
+use crate::model::{PersonalBody, TrackerModel};
 use crate::registration::Observation;
 use crate::segment::{Contour, contour};
+use crate::settings::TrackerConfig;
 use tryon_body::{BoneTransforms, Pose, RestBody, embedded, skin};
 use tryon_geometry::camera::{Calibration, DepthImage, Intrinsics};
 use tryon_geometry::math::{P3, P3d};
@@ -121,7 +122,7 @@ impl DepthScan {
         }
         grid.refine(image, &cells);
         let mut edges = Contour::default();
-        contour(&grid, &cells, &mut edges);
+        contour(&grid, &cells, &model.config.segment, &mut edges);
         let points: Vec<P3> = cells.iter().map(|&c| grid.points[c as usize]).collect();
         Self {
             tree: PointTree::new(&points),

@@ -306,12 +306,10 @@ fn each_skip_keeps_its_bound() {
     let all = TrackerConfig::default();
     let coarse = TrackerConfig {
         skip_coarse: false,
-        ..all.clone()
+        ..all
     };
-    let settled = TrackerConfig {
-        skip_settled: false,
-        ..all.clone()
-    };
+    let mut settled = all;
+    settled.shape.surface.settled = 0.0;
     let converged = TrackerConfig {
         converged: 0.0,
         ..all
@@ -333,7 +331,7 @@ fn each_skip_keeps_its_bound() {
     );
     let unchanged = TrackerConfig {
         skip_unchanged: false,
-        ..TrackerConfig::default()
+        ..all
     };
     let (template, still) = scene(
         Setting {
@@ -358,10 +356,8 @@ fn each_skip_keeps_its_bound() {
     let mut dance = DepthScene::open(&folder).expect("scene");
     dance.frames.truncate(110);
     dance.truth.truncate(110);
-    let searches = TrackerConfig {
-        skip_converged: false,
-        ..TrackerConfig::default()
-    };
+    let mut searches = all;
+    searches.registration.reuse = 0.0;
     compare_skips(
         &template,
         &dance,
@@ -441,8 +437,7 @@ fn limb_recovery_finds_an_arm_lost_at_low_rate() {
     let error = |rescue| {
         let config = TrackerConfig {
             rescue,
-            judge: false,
-            ..TrackerConfig::default()
+            ..TrackerConfig::default().without_doubt()
         };
         mean(&follow(&template, &config, &own, |_, _, _, _, _| {}).joints_mm)
     };

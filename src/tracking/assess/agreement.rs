@@ -6,20 +6,13 @@
 use crate::fit::{FitContext, FitScratch};
 use crate::model::TrackerModel;
 use crate::registration::{IndexImage, Observation};
+use crate::settings::AssessSettings;
 use serde::{Deserialize, Serialize};
 use tryon_body::Pose;
 use tryon_geometry::spatial::{Label, OrganisedCloud, chessboard_distances};
 
 /// Number of [`BodyPart`](tryon_body::parts::BodyPart)s.
 pub(crate) const PARTS: usize = 5;
-
-/// Width of a seam along outlines that counts for neither side, metres: loose clothes and a body of not quite the right
-/// shape. Larger hides thin limbs.
-const SEAM: f32 = 0.035;
-/// Least width of the seam, cells: outlines are that coarse.
-const LEAST_SEAM: u16 = 2;
-/// Difference in depth above which body and reading are different surfaces, metres: thick clothes stay below.
-pub(crate) const APART: f32 = 0.10;
 
 /// Areas of disagreement as shares of the area in the image that subject and body cover together.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -59,6 +52,15 @@ impl PartArea {
     }
 }
 
+/// Limits of free space in one frame.
+#[derive(Clone, Copy)]
+struct FreeLimits {
+    /// Width of the seam, cells.
+    seam: u16,
+    /// Difference in depth of different surfaces, metres.
+    apart: f32,
+}
+
 /// Scratch of the comparison.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct AgreementScratch {
@@ -86,25 +88,30 @@ impl AgreementScratch {
         observation: &Observation<'_>,
         image: &IndexImage,
     ) -> Agreement {
+        let settings = &model.config.assess;
         let grid = observation.grid;
         let is_subject = |k: usize| grid.labels[k] == Label::Person && grid.depth[k] > 0.0;
         let is_body = |k: usize| image.index[k] != IndexImage::NONE;
         let nothing = |_| u16::MAX;
         chessboard_distances(grid, is_subject, nothing, &mut self.to_subject);
         chessboard_distances(grid, is_body, nothing, &mut self.to_body);
-        let seam = seam(observation);
+        let seam = seam(observation, settings);
+        let limits = FreeLimits {
+            seam,
+            apart: settings.apart,
+        };
 
         let (mut area, mut uncovered) = (0u32, 0u32);
         let mut parts = [PartArea::default(); PARTS];
         for k in 0..grid.depth.len() {
             let (body, subject) = (is_body(k), is_subject(k));
             area += u32::from(body || subject);
-            let near = subject && body && image.depth[k] > grid.depth[k] + APART;
+            let near = subject && body && image.depth[k] > grid.depth[k] + settings.apart;
             uncovered += u32::from(near || subject && self.to_body[k] > seam);
             if body {
                 let bone = usize::from(model.bones[image.index[k] as usize]);
                 let part = &mut parts[model.parts[bone]];
-                part.free += u32::from(self.is_free(grid, k, image.depth[k], seam));
+                part.free += u32::from(self.is_free(grid, k, image.depth[k], limits));
                 part.unknown += u32::from(grid.labels[k] == Label::Unknown);
                 part.all += 1;
             }
@@ -122,28 +129,29 @@ impl AgreementScratch {
 
     /// True when a body surface at depth `z` stands in cell `k` before a farther reading, or where the background was
     /// removed.
-    fn is_free(&self, grid: &OrganisedCloud, k: usize, z: f32, seam: u16) -> bool {
+    fn is_free(&self, grid: &OrganisedCloud, k: usize, z: f32, limits: FreeLimits) -> bool {
+        let FreeLimits { seam, apart } = limits;
         match grid.labels[k] {
             Label::Unknown => false,
-            Label::Person => z < grid.depth[k] - APART,
+            Label::Person => z < grid.depth[k] - apart,
             Label::Background if grid.depth[k] == 0.0 => self.to_subject[k] > seam,
             Label::Background | Label::Floor | Label::Other => {
-                z < grid.depth[k] - APART && self.to_subject[k] > seam
+                z < grid.depth[k] - apart && self.to_subject[k] > seam
             }
         }
     }
 }
 
 /// Width of the seam at the subject's distance, cells.
-fn seam(observation: &Observation<'_>) -> u16 {
+fn seam(observation: &Observation<'_>, settings: &AssessSettings) -> u16 {
     let grid = observation.grid;
     let depths = observation.cells.iter().map(|&c| grid.depth[c as usize]);
     let (sum, n) = depths
         .filter(|d| *d > 0.0)
         .fold((0.0, 0.0), |(s, n), d| (s + d, n + 1.0f32));
     let focal = grid.focal()[0].max(grid.focal()[1]);
-    let cells = SEAM * focal * n / f32::max(sum, f32::MIN_POSITIVE);
-    (cells.round().min(f32::from(u16::MAX)) as u16).max(LEAST_SEAM)
+    let cells = settings.seam * focal * n / f32::max(sum, f32::MIN_POSITIVE);
+    (cells.round().min(f32::from(u16::MAX)) as u16).max(settings.least_seam)
 }
 
 #[cfg(test)]

@@ -33,22 +33,8 @@ pub struct JointConfidence {
     pub reason: ConfidenceReason,
 }
 
-/// Readings of a bone at which its confidence is half of the most.
-const HALF_SURE: f32 = 4.0;
-/// Information below which a degree of freedom is ambiguous, per point, m²/rad²: a twentieth of a shank in view.
-const AMBIGUOUS: f64 = 3e-5;
 /// Distance from a limit that counts as at the limit, radians.
 const LIMIT: f64 = 1e-3;
-/// Factors on the confidence of a joint with a limiting reason.
-const NO_RETURN_FACTOR: f32 = 0.5;
-/// See [`NO_RETURN_FACTOR`].
-const AMBIGUOUS_FACTOR: f32 = 0.7;
-/// See [`NO_RETURN_FACTOR`].
-const AT_LIMIT_FACTOR: f32 = 0.8;
-/// Share of a body part in free space from which its joints say so: outlines of well tracked limbs reach 0.2.
-const FREE: f32 = 0.25;
-/// Depth behind the drawn model from which a model point is occluded by it, metres.
-const HIDDEN: f32 = 0.05;
 
 /// Confidence of every joint of the skeleton, in a pose that agrees with its frame so far.
 pub(crate) fn confidence(
@@ -57,6 +43,7 @@ pub(crate) fn confidence(
     scratch: &FitScratch,
     agreement: &Agreement,
 ) -> Vec<JointConfidence> {
+    let settings = &context.model.config.assess.confidence;
     let model = context.model;
     let skeleton = model.template.skeleton();
     let readings = paired_samples(context, scratch);
@@ -80,20 +67,26 @@ pub(crate) fn confidence(
         let at_limit = angles.clone().any(|k| {
             pose.angles[k] - limits[k][0] < LIMIT || limits[k][1] - pose.angles[k] < LIMIT
         });
-        let share = readings[bone] as f32 / (readings[bone] as f32 + HALF_SURE);
+        let share = readings[bone] as f32 / (readings[bone] as f32 + settings.half_sure);
         let free = agreement.parts[model.parts[j]];
-        let (reason, value) = if free > FREE {
+        let (reason, value) = if free > settings.free {
             (ConfidenceReason::InFreeSpace, (1.0 - free) * share)
         } else if readings[bone] == 0 && missing[bone] == 0 {
             (ConfidenceReason::Unseen, 0.0)
         } else if readings[bone] == 0 {
             (ConfidenceReason::NoReturn, 0.0)
         } else if missing[bone] > readings[bone] {
-            (ConfidenceReason::NoReturn, NO_RETURN_FACTOR * share)
-        } else if !angles.is_empty() && least < AMBIGUOUS {
-            (ConfidenceReason::Ambiguous, AMBIGUOUS_FACTOR * share)
+            (
+                ConfidenceReason::NoReturn,
+                settings.no_return_factor * share,
+            )
+        } else if !angles.is_empty() && least < settings.ambiguous {
+            (
+                ConfidenceReason::Ambiguous,
+                settings.ambiguous_factor * share,
+            )
         } else if at_limit {
-            (ConfidenceReason::AtLimit, AT_LIMIT_FACTOR * share)
+            (ConfidenceReason::AtLimit, settings.at_limit_factor * share)
         } else {
             (ConfidenceReason::Measured, share)
         };
@@ -113,6 +106,7 @@ fn paired_samples(context: &FitContext<'_>, scratch: &FitScratch) -> Vec<u32> {
 
 /// Visible samples of each bone at cells without any reading.
 fn samples_without_return(context: &FitContext<'_>, scratch: &FitScratch) -> Vec<u32> {
+    let settings = &context.model.config.assess.confidence;
     let grid = context.observation.grid;
     let image = &scratch.pairing.image;
     let mut counts = vec![0u32; context.model.parents.len()];
@@ -123,7 +117,7 @@ fn samples_without_return(context: &FitContext<'_>, scratch: &FitScratch) -> Vec
         let Some(cell) = grid.cell_of(p).and_then(|(u, v)| grid.cell(u, v)) else {
             continue;
         };
-        if grid.labels[cell] == Label::Unknown && p.z <= image.depth[cell] + HIDDEN {
+        if grid.labels[cell] == Label::Unknown && p.z <= image.depth[cell] + settings.hidden {
             counts[usize::from(context.model.bones[i])] += 1;
         }
     }
@@ -134,7 +128,7 @@ fn samples_without_return(context: &FitContext<'_>, scratch: &FitScratch) -> Vec
 mod tests {
     use super::*;
     use crate::assess::agreement::AgreementScratch;
-    use crate::fit::{TRACK, fit_pose};
+    use crate::fit::fit_pose;
     use crate::test_scene::{DepthScan, TestScene};
 
     #[test]
@@ -146,7 +140,8 @@ mod tests {
         let context = scene.context(&body, &observation);
         let mut scratch = FitScratch::default();
         let mut pose = scene.pose.clone();
-        fit_pose(&context, &mut pose, &TRACK, &mut scratch);
+        let track = &context.model.config.fit.track;
+        fit_pose(&context, &mut pose, track, &mut scratch);
         pose.set(skeleton, "left_shoulder", &[0.0, 0.0, 1.2]);
         let agreement = AgreementScratch::default().measure(&context, &pose, &mut scratch);
         let joints = confidence(&context, &pose, &scratch, &agreement);

@@ -6,7 +6,7 @@ pub(crate) mod person_evidence;
 pub(crate) mod seat;
 
 pub use agreement::Agreement;
-pub(crate) use agreement::{APART, AgreementScratch};
+pub(crate) use agreement::AgreementScratch;
 pub(crate) use confidence::confidence;
 pub use confidence::{ConfidenceReason, JointConfidence};
 pub(crate) use person_evidence::{PersonBelief, PersonEvidence, Verdict};

@@ -8,40 +8,12 @@ use super::agreement::PARTS;
 use crate::model::{PART_CLASSES, PartKind, TrackerModel};
 use crate::registration::{IndexImage, Observation};
 use crate::segment::part_forest::ClassMap;
+use crate::settings::BeliefSettings;
 use serde::{Deserialize, Serialize};
 use tryon_geometry::spatial::{Label, OrganisedCloud};
 
 /// Kinds of classes: both sides are one, as left and right change places with the facing; the neck is the last.
 const KINDS: usize = PART_CLASSES.div_ceil(2);
-/// Difference in depth up to which a reading covers the drawn body, metres: thick clothes stay below.
-const COVERED: f32 = 0.10;
-/// Least cells of a head that decide on it; fewer are a head out of the image.
-const LEAST_HEAD: f32 = 10.0;
-/// Covered share of a head in full view; the seam about it isn't covered. More says nothing: a head within a coat.
-const FULL_HEAD: f32 = 0.6;
-/// Covered share that stands for a head out of view.
-const HIDDEN_HEAD: f32 = 0.45;
-/// Log odds of a start per unit of similarity, covered head and matched points, and at zero: logistic regression on the
-/// starts of `tryon-bench people` (furniture against people) and of recordings; see docs/decisions/047.
-const START_WEIGHTS: [f32; 3] = [17.6, 8.05, 18.4];
-/// See [`START_WEIGHTS`].
-const START_BIAS: f32 = -32.4;
-/// The same for a person who is followed, per unit of agreement, similarity and covered head. Who was found whole may be
-/// hidden in part later: matched points say nothing any more.
-const WEIGHTS: [f32; 3] = [8.8, 20.0, 14.7];
-/// See [`WEIGHTS`].
-const BIAS: f32 = -25.25;
-/// Summed log odds from which a subject is a person. Larger starts later; the most likely of 205 starts of things had 2.6,
-/// and things lose matched points in the next frame.
-const SURE: f32 = 3.0;
-/// Least log odds that earlier refusals leave: a mannequin that is taken away lets a person stand in its place.
-const MOST_DOUBT: f32 = -6.0;
-/// Most frames in which a start may become sure.
-const LONGEST: u32 = 15;
-/// Weight of a new frame in the running log odds of a person. Larger loses one who hides the head for a moment.
-const NEWEST: f32 = 0.3;
-/// Running log odds below which a subject no longer is a person.
-const KEEP: f32 = -0.5;
 
 /// Figures of one fitted body.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -100,8 +72,9 @@ impl FittedImage<'_> {
 
     /// True where the subject covers the body.
     fn is_covered(&self, cell: usize) -> bool {
+        let settings = &self.model.config.assess.belief;
         let off = (self.image.depth[cell] - self.grid.depth[cell]).abs();
-        self.grid.labels[cell] == Label::Person && off < COVERED
+        self.grid.labels[cell] == Label::Person && off < settings.covered
     }
 }
 
@@ -143,18 +116,26 @@ impl PersonEvidence {
         }
         Self {
             matched,
-            ..sums.evidence()
+            ..sums.evidence(&model.config.assess.belief)
         }
     }
 
     /// Logarithm of the odds for a person at a start.
-    fn start_odds(&self) -> f32 {
-        START_BIAS + dot(START_WEIGHTS, [self.similarity, self.head, self.matched])
+    fn start_odds(&self, settings: &BeliefSettings) -> f32 {
+        settings.start_bias
+            + dot(
+                settings.start_weights,
+                [self.similarity, self.head, self.matched],
+            )
     }
 
     /// The same for a subject that was a person before.
-    fn track_odds(&self) -> f32 {
-        BIAS + dot(WEIGHTS, [self.agreement, self.similarity, self.head])
+    fn track_odds(&self, settings: &BeliefSettings) -> f32 {
+        settings.bias
+            + dot(
+                settings.weights,
+                [self.agreement, self.similarity, self.head],
+            )
     }
 }
 
@@ -185,7 +166,7 @@ impl KindSums {
         }
     }
 
-    fn evidence(&self) -> PersonEvidence {
+    fn evidence(&self, settings: &BeliefSettings) -> PersonEvidence {
         let (cells, drawn) = (self.cells.max(1.0), self.drawn.max(1.0));
         let pairs = self.seen.iter().zip(&self.expected);
         let common = pairs.map(|(s, e)| (s / cells).min(e / drawn));
@@ -193,10 +174,10 @@ impl KindSums {
         PersonEvidence {
             agreement: self.agreement / cells,
             similarity: common.sum(),
-            head: if all < LEAST_HEAD {
-                HIDDEN_HEAD
+            head: if all < settings.least_head {
+                settings.hidden_head
             } else {
-                (covered / all).min(FULL_HEAD)
+                (covered / all).min(settings.full_head)
             },
             matched: 0.0,
         }
@@ -228,9 +209,9 @@ pub(crate) struct PersonBelief {
 
 impl PersonBelief {
     /// Belief in a person of whom somebody else is sure.
-    pub(crate) fn given() -> Self {
+    pub(crate) fn given(settings: &BeliefSettings) -> Self {
         Self {
-            log_odds: SURE,
+            log_odds: settings.sure,
             refused: 0.0,
             frames: 0,
             verdict: Verdict::Person,
@@ -238,8 +219,8 @@ impl PersonBelief {
     }
 
     /// Belief in a candidate just found, of log odds `refused` after earlier refusals.
-    pub(crate) fn start(refused: f32) -> Self {
-        let refused = refused.max(MOST_DOUBT);
+    pub(crate) fn start(refused: f32, settings: &BeliefSettings) -> Self {
+        let refused = refused.max(settings.most_doubt);
         Self {
             log_odds: refused,
             refused,
@@ -249,16 +230,16 @@ impl PersonBelief {
     }
 
     /// Adds the evidence of a frame.
-    pub(crate) fn update(&mut self, evidence: PersonEvidence) {
+    pub(crate) fn update(&mut self, evidence: PersonEvidence, settings: &BeliefSettings) {
         self.log_odds += match self.verdict {
-            Verdict::Person => NEWEST * (evidence.track_odds() - self.log_odds),
-            _ => evidence.start_odds(),
+            Verdict::Person => settings.newest * (evidence.track_odds(settings) - self.log_odds),
+            _ => evidence.start_odds(settings),
         };
         self.frames = self.frames.saturating_add(1);
         self.verdict = match self.verdict {
-            Verdict::Person if self.log_odds >= KEEP => Verdict::Person,
-            Verdict::Unsure if self.log_odds >= SURE => Verdict::Person,
-            Verdict::Unsure if self.log_odds >= self.refused && self.frames < LONGEST => {
+            Verdict::Person if self.log_odds >= settings.keep => Verdict::Person,
+            Verdict::Unsure if self.log_odds >= settings.sure => Verdict::Person,
+            Verdict::Unsure if self.log_odds >= self.refused && self.frames < settings.longest => {
                 Verdict::Unsure
             }
             _ => Verdict::Nobody,
@@ -314,42 +295,52 @@ mod tests {
 
     #[test]
     fn a_body_is_a_person_and_a_board_is_not() {
-        let scene = TestScene::new(1000, 480);
+        let (scene, settings) = (TestScene::new(1000, 480), BeliefSettings::default());
         let person = evidence(&scene, &scene.depth(&scene.pose), 0.95);
         assert!(
-            person.start_odds() > SURE && person.track_odds() > SURE,
+            person.start_odds(&settings) > settings.sure
+                && person.track_odds(&settings) > settings.sure,
             "{person:?}"
         );
         let thing = evidence(&scene, &board(&scene), 0.8);
-        assert!(thing.start_odds() < SURE - 2.0, "{thing:?}");
-        assert!(thing.track_odds() < person.track_odds() - 3.0, "{thing:?}");
+        assert!(
+            thing.start_odds(&settings) < settings.sure - 2.0,
+            "{thing:?}"
+        );
+        assert!(
+            thing.track_odds(&settings) < person.track_odds(&settings) - 3.0,
+            "{thing:?}"
+        );
     }
 
     #[test]
     fn nothing_is_nobody() {
-        let scene = TestScene::new(300, 240);
+        let (scene, settings) = (TestScene::new(300, 240), BeliefSettings::default());
         let nothing = evidence(&scene, &DepthImage::empty(640, 240), 0.0);
         assert_eq!((nothing.agreement, nothing.similarity), (0.0, 0.0));
         assert!(
-            nothing.start_odds() < -SURE && nothing.track_odds() < -SURE,
+            nothing.start_odds(&settings) < -settings.sure
+                && nothing.track_odds(&settings) < -settings.sure,
             "{nothing:?}"
         );
     }
 
     /// Evidence of given log odds.
     fn of_odds(odds: f32) -> PersonEvidence {
+        let settings = BeliefSettings::default();
         PersonEvidence {
-            agreement: (odds - BIAS) / WEIGHTS[0],
-            matched: (odds - START_BIAS) / START_WEIGHTS[2],
+            agreement: (odds - settings.bias) / settings.weights[0],
+            matched: (odds - settings.start_bias) / settings.start_weights[2],
             ..PersonEvidence::default()
         }
     }
 
     /// Verdicts after a start and further frames.
     fn verdicts(refused: f32, odds: &[f32]) -> Vec<Verdict> {
-        let mut belief = PersonBelief::start(refused);
+        let settings = BeliefSettings::default();
+        let mut belief = PersonBelief::start(refused, &settings);
         let verdict = |odds: &f32| {
-            belief.update(of_odds(*odds));
+            belief.update(of_odds(*odds), &settings);
             belief.verdict
         };
         odds.iter().map(verdict).collect()
@@ -366,7 +357,10 @@ mod tests {
         assert_eq!(refused, [Unsure, Person], "doubt has a limit");
         assert_eq!(verdicts(-4.0, &[5.0, -2.0, 1.0]), [Unsure; 3]);
         assert_eq!(verdicts(-4.0, &[1.0, -2.0]), [Unsure, Nobody]);
-        let forever = verdicts(0.0, &[0.01; LONGEST as usize + 1]);
+        let forever = verdicts(
+            0.0,
+            &vec![0.01; BeliefSettings::default().longest as usize + 1],
+        );
         assert_eq!(
             forever.last(),
             Some(&Nobody),

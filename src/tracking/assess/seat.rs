@@ -2,21 +2,13 @@
 
 use super::confidence::JointConfidence;
 use crate::model::TrackerModel;
+use crate::settings::SeatSettings;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 use tryon_geometry::math::P3d;
 
 /// Share of the body's mass in the trunk with head and arms; the rest is at the knees (Winter 2009, table 4.1: legs 32 %).
 const TRUNK_MASS: f64 = 0.68;
-/// Length of the heel behind the ankle, metres: the end of what feet can bear.
-const HEEL: f64 = 0.05;
-/// Distance of the centre of mass behind the heels from which a seat bears the body, metres. Seated people have 0.15 to
-/// 0.25; those who crouch or bend down keep it over their feet, less the errors of tracked legs.
-const BEHIND: f64 = 0.10;
-/// Cosine to the vertical below which a thigh is raised: more than 45° forward.
-const RAISED: f64 = 0.7;
-/// Frames in a row after which another posture counts; the first one counts at once.
-const STEADY: u32 = 5;
 
 /// Posture of the subject over time.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -32,10 +24,10 @@ pub(crate) struct Seat {
 
 impl Seat {
     /// Adds a frame; `None` where the legs aren't in view.
-    pub(crate) fn update(&mut self, sits: Option<bool>) {
+    pub(crate) fn update(&mut self, sits: Option<bool>, settings: &SeatSettings) {
         let is_against = sits.is_some_and(|sits| sits != self.is_taken);
         self.against = if is_against { self.against + 1 } else { 0 };
-        if self.against >= STEADY || is_against && !self.is_known {
+        if self.against >= settings.steady || is_against && !self.is_known {
             (self.is_taken, self.against) = (!self.is_taken, 0);
         }
         self.is_known |= sits.is_some();
@@ -49,6 +41,7 @@ pub(crate) fn sits(
     joints: &[P3d],
     confidence: &[JointConfidence],
 ) -> Option<bool> {
+    let settings = &model.config.assess.seat;
     let is_seen = |knee: usize| confidence.get(knee).is_some_and(|c| c.value > 0.0);
     let mut knees = model.standing.iter().filter_map(|leg| leg.knee);
     if !knees.any(is_seen) {
@@ -62,15 +55,15 @@ pub(crate) fn sits(
     let [hip, knee, ankle] = std::array::from_fn(|k| (left[k] + right[k]) * 0.5);
     let is_raised = |[hip, knee, _]: &[Vector3<f64>; 3]| {
         let thigh = knee - hip;
-        -thigh.dot(up) < RAISED * thigh.norm()
+        -thigh.dot(up) < settings.raised * thigh.norm()
     };
     let level = |v: Vector3<f64>| v - up * v.dot(up);
     let Some(front) = level(knee - hip).try_normalize(0.0) else {
         return Some(false);
     };
     let centre = joints[model.chest].coords * TRUNK_MASS + knee * (1.0 - TRUNK_MASS);
-    let behind = (ankle - centre).dot(&front) - HEEL;
-    Some(is_raised(&left) && is_raised(&right) && behind > BEHIND)
+    let behind = (ankle - centre).dot(&front) - settings.heel;
+    Some(is_raised(&left) && is_raised(&right) && behind > settings.behind)
 }
 
 #[cfg(test)]
@@ -123,22 +116,23 @@ mod tests {
 
     #[test]
     fn the_first_posture_counts_at_once_and_another_after_some_frames_in_a_row() {
+        let settings = SeatSettings::default();
         let mut seated = Seat::default();
-        seated.update(None);
+        seated.update(None, &settings);
         assert!(!seated.is_taken);
-        seated.update(Some(true));
+        seated.update(Some(true), &settings);
         assert!(seated.is_taken);
 
         let mut seat = Seat::default();
-        seat.update(Some(false));
+        seat.update(Some(false), &settings);
         let feed = |seat: &mut Seat, n: u32, sits: Option<bool>| {
-            (0..n).for_each(|_| seat.update(sits));
+            (0..n).for_each(|_| seat.update(sits, &settings));
             seat.is_taken
         };
-        assert!(!feed(&mut seat, STEADY - 1, Some(true)));
+        assert!(!feed(&mut seat, settings.steady - 1, Some(true)));
         assert!(!feed(&mut seat, 1, Some(false)), "not in a row");
-        assert!(feed(&mut seat, STEADY, Some(true)));
+        assert!(feed(&mut seat, settings.steady, Some(true)));
         assert!(feed(&mut seat, 50, None), "legs out of view say nothing");
-        assert!(!feed(&mut seat, STEADY, Some(false)));
+        assert!(!feed(&mut seat, settings.steady, Some(false)));
     }
 }

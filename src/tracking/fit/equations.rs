@@ -1,45 +1,21 @@
 //! Correspondences and normal equations of one iteration: point residuals, then rest pose, floor and hands.
 
-use super::schedule::FitTerms;
 use super::scratch::{FitContext, FitScratch};
 use super::standing::planted;
+use super::terms::FitTerms;
 use crate::model::{Limb, TrackerModel};
 use crate::registration::residual::{
-    ClearanceResidual, EdgeResidual, FloorPlane, FloorResidual, FloorWeights, FreeSpaceResidual,
-    HandResidual, LimbMotion, PointTerm, Residual, RestPoseResidual, SurfaceMetric,
-    SurfaceResidual,
+    ClearanceResidual, EdgeResidual, FloorPlane, FloorResidual, HandResidual, LimbMotion,
+    PointTerm, Residual, RestPoseResidual, SurfaceMetric, SurfaceResidual,
 };
 use crate::registration::{
-    Dof, EdgeSide, NormalEquations, PairingConfig, PairingStats, ROOT_UNKNOWNS, linearise,
-    pair_edges, pair_surfaces,
+    Dof, NormalEquations, PairingConfig, PairingStats, ROOT_UNKNOWNS, linearise, pair_edges,
+    pair_surfaces,
 };
 use nalgebra::Vector3;
 use tryon_body::Pose;
 use tryon_geometry::math::P3d;
 use tryon_geometry::spatial::OrganisedCloud;
-
-/// Smallest cosine between normals of a pair (Table 1: 60°).
-const COS_NORMAL: f32 = 0.5;
-/// Displacement since its last query up to which a point keeps its reading, metres: a fifth of a cell.
-const REUSE: f32 = 2e-3;
-/// Distance at which a reading without model point, or a visible point without reading, counts in the cost, metres.
-pub(super) const UNEXPLAINED: f64 = 0.10;
-
-/// Information below which an angle counts as hidden, per point, m²/rad²; a shank in view has 7·10⁻⁴. Larger lets the
-/// prior act against readings.
-const HIDDEN: f64 = 1e-5;
-/// Information below which the floor acts on an angle, per point, m²/rad²: a strip of shank at the image rim. Larger
-/// helps a body of wrong size by 1 mm and costs one of right size as much (waist-up sequence, docs/decisions).
-const BARELY_SEEN: f64 = 3e-5;
-/// Prior weight of a hidden leg, per point and squared radian.
-const HIDDEN_LEG_PULL: f64 = 2e-5;
-/// Prior weight of a hidden leg whose foot is planted: a straight knee is then no more likely than a bent one.
-const PLANTED_LEG_PULL: f64 = 2e-6;
-/// Weight of a detected hand, per point. It decides against arms without a reading (2·10⁻⁶ per squared radian) and hardly
-/// moves seen ones (10⁻³).
-const HAND_WEIGHT: f64 = 1e-3;
-/// Weight of a point of an arm inside the trunk, per point, likewise.
-const CLEARANCE_WEIGHT: f64 = 1e-3;
 
 /// Sums over the pairs of the surface residual.
 #[derive(Clone, Copy, Debug, Default)]
@@ -60,32 +36,23 @@ pub(crate) fn pair(
     pull: f32,
     scratch: &mut FitScratch,
 ) -> PairingStats {
+    let settings = &context.model.config.registration;
     scratch.pose_samples(context, pose);
     let (model, observation, terms) = (context.model, context.observation, scratch.terms);
     let config = PairingConfig {
         association: terms.association,
         distance,
-        cos_normal: COS_NORMAL,
-        pull: if model.config.pull { pull } else { 0.0 },
+        pull,
         data_step: model.config.data_step,
-        reuse: if model.config.skip_converged {
-            REUSE
-        } else {
-            0.0
-        },
+        settings: *settings,
     };
     let mut pairs = std::mem::take(&mut scratch.pairs);
     let mut pairing = std::mem::take(&mut scratch.pairing);
     let mut edges = std::mem::take(&mut scratch.edges);
     let points = scratch.points(model);
     let stats = pair_surfaces(&points, observation, &config, &mut pairing, &mut pairs);
-    if terms.edge_weight > 0.0 || terms.free_space > 0.0 {
-        let side = if terms.edge_weight > 0.0 {
-            EdgeSide::Outline
-        } else {
-            EdgeSide::Outside
-        };
-        pair_edges(&points, observation, &pairing.image, side, &mut edges);
+    if terms.edge_weight > 0.0 {
+        pair_edges(&points, observation, &pairing.image, settings, &mut edges);
     } else {
         edges.pairs.clear();
     }
@@ -102,6 +69,7 @@ pub(crate) fn for_each_point(
     point_to_point: f64,
     mut visit: impl FnMut(&PointTerm),
 ) -> PoseSums {
+    let settings = &context.model.config.fit;
     let (config, terms) = (&context.model.config, &scratch.terms);
     let grid = context.observation.grid;
     let model = &scratch.points(context.model);
@@ -116,11 +84,12 @@ pub(crate) fn for_each_point(
             normals: config.normals,
             robust: config.robust,
             sigma,
+            pull_length: config.registration.pull_length,
         },
     };
     let mut sums = PoseSums::default();
     surface.for_each(|term| {
-        sums.cost += term.cost.min(UNEXPLAINED * UNEXPLAINED);
+        sums.cost += term.cost.min(settings.unexplained * settings.unexplained);
         sums.weight += term.weight;
         sums.distance += term.weight * term.metric.direction.dot(&term.residual).abs();
         visit(term);
@@ -129,19 +98,10 @@ pub(crate) fn for_each_point(
         model,
         grid,
         pairs: &scratch.edges.pairs,
-        weight: terms.edge_weight.max(terms.free_space),
-        sigma,
+        weight: terms.edge_weight,
+        sigma: sigma.max(config.registration.edge_sigma),
     };
     edge.for_each(&mut visit);
-    if terms.free_space > 0.0 {
-        let free = FreeSpaceResidual {
-            model,
-            grid,
-            in_front: &scratch.pairing.in_front,
-            weight: terms.free_space,
-        };
-        free.for_each(&mut visit);
-    }
     sums
 }
 
@@ -178,6 +138,7 @@ fn add_priors(
     scratch: &mut FitScratch,
     equations: &mut NormalEquations,
 ) {
+    let settings = &context.model.config.fit;
     let (model, grid) = (context.model, context.observation.grid);
     let standing = scratch.terms.standing;
     let joints = &scratch.bones.joints;
@@ -185,7 +146,7 @@ fn add_priors(
     scratch.unseen.clear();
     for k in 0..pose.angles.len() {
         let information = equations.hessian[(ROOT_UNKNOWNS + k, ROOT_UNKNOWNS + k)];
-        let share = BARELY_SEEN / (BARELY_SEEN + information);
+        let share = settings.barely_seen / (settings.barely_seen + information);
         scratch.unseen.push(share.powi(2));
     }
     let prior = RestPoseResidual {
@@ -215,7 +176,7 @@ fn add_priors(
             arm: limb_motion(arm, scratch, &centre),
             hand: arm.hand(&scratch.bones),
             target,
-            weight: HAND_WEIGHT,
+            weight: settings.hand_weight,
         };
         residual.for_each(|row| equations.add_row(row));
     }
@@ -236,6 +197,7 @@ fn limb_motion<'a>(
 
 /// Pushes both arms out of the trunk.
 fn add_clearance(model: &TrackerModel, scratch: &FitScratch, equations: &mut NormalEquations) {
+    let settings = &model.config.fit;
     let Some(column) = model.trunk.and_then(|t| t.column(&scratch.bones)) else {
         return;
     };
@@ -246,7 +208,7 @@ fn add_clearance(model: &TrackerModel, scratch: &FitScratch, equations: &mut Nor
                 arm: limb_motion(arm, scratch, &centre),
                 point,
                 column: &column,
-                weight: CLEARANCE_WEIGHT,
+                weight: settings.clearance_weight,
             };
             residual.for_each(|row| equations.add_row(row));
         }
@@ -260,17 +222,18 @@ fn prior_weights(
     planted: [bool; 2],
     equations: &NormalEquations,
 ) -> Vec<f64> {
+    let settings = &model.config.fit;
     let leg_pull = |k: usize| {
         let mut legs = model.standing.iter().zip(planted);
         if legs.any(|(leg, stays)| stays && leg.moves(k)) {
-            PLANTED_LEG_PULL
+            settings.planted_leg_pull
         } else {
-            HIDDEN_LEG_PULL
+            settings.hidden_leg_pull
         }
     };
     let weight = |(k, &stiffness): (usize, &f64)| {
         let information = equations.hessian[(ROOT_UNKNOWNS + k, ROOT_UNKNOWNS + k)];
-        let hidden = (HIDDEN / (HIDDEN + information)).powi(2);
+        let hidden = (settings.hidden / (settings.hidden + information)).powi(2);
         let seen_share = if terms.eased {
             model.seen_shares[k]
         } else {
@@ -315,7 +278,7 @@ impl FloorLegs<'_> {
                 centre: &self.joints[0].coords,
                 unseen: self.unseen,
                 grid: self.grid,
-                weights: FloorWeights::default(),
+                settings: self.model.config.registration.floor,
             };
             residual.for_each(|row| equations.add_row(row));
         }

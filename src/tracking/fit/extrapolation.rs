@@ -11,7 +11,7 @@ pub(crate) fn extrapolate(skeleton: &Skeleton, before: &Pose, last: &Pose, ratio
     let translation = b.translation.vector + (b.translation.vector - a.translation.vector) * ratio;
     let mut next = last.clone();
     next.root = Rigid::from_parts(translation, rotation);
-    advance_angles(skeleton, &mut next, (before, last), |_| ratio);
+    advance_angles(skeleton, &mut next, before, last, |_| ratio);
     next
 }
 
@@ -19,7 +19,8 @@ pub(crate) fn extrapolate(skeleton: &Skeleton, before: &Pose, last: &Pose, ratio
 pub(crate) fn advance_angles(
     skeleton: &Skeleton,
     pose: &mut Pose,
-    (from, to): (&Pose, &Pose),
+    from: &Pose,
+    to: &Pose,
     share: impl Fn(usize) -> f64,
 ) {
     for (j, joint) in skeleton.joints().iter().enumerate() {

@@ -1,35 +1,28 @@
 //! Assignment of hands detected on their own to arms whose sleeve gives no return.
 
 use crate::model::{Limb, TrackerModel};
+use crate::settings::HandAssignmentSettings;
 use tryon_body::{BoneTransforms, Pose, RestBody};
 use tryon_geometry::math::{P3, P3d};
 use tryon_geometry::spatial::{Label, OrganisedCloud};
 
-/// Distance up to which a hand is left to the hand residual, metres; a farther one gets an arm pose by inverse kinematics.
-const FOLLOWED: f64 = 0.15;
-/// Points tested along a forearm, and how many must have a reading for the forearm to count as seen.
-const FOREARM_POINTS: usize = 5;
-/// See [`FOREARM_POINTS`].
-const SEEN_POINTS: usize = 3;
-/// Points in measured free space from which on an arm does not lead to its hand.
-const AIR_POINTS: usize = 2;
-/// Depth difference up to which a reading belongs to the forearm, metres.
-const FOREARM_DEPTH: f64 = 0.10;
-/// Arm lengths from the shoulder beyond which a hand belongs to another person.
-const STRETCH: f64 = 1.15;
-
 /// True when the subject has readings along the forearm.
-fn is_forearm_seen(arm: &Limb, bones: &BoneTransforms, grid: &OrganisedCloud) -> bool {
+fn is_forearm_seen(
+    arm: &Limb,
+    bones: &BoneTransforms,
+    grid: &OrganisedCloud,
+    settings: &HandAssignmentSettings,
+) -> bool {
     let (from, to) = (bones.joints[arm.hinge], arm.hand(bones));
     let on = |k: &usize| {
-        let p = from + (to - from) * (*k as f64 / (FOREARM_POINTS - 1) as f64);
+        let p = from + (to - from) * (*k as f64 / (settings.forearm_points - 1) as f64);
         let cell = grid.cell_of(&p.cast()).and_then(|(u, v)| grid.cell(u, v));
         cell.is_some_and(|c| {
             grid.labels[c] == Label::Person
-                && (f64::from(grid.depth[c]) - p.z).abs() < FOREARM_DEPTH
+                && (f64::from(grid.depth[c]) - p.z).abs() < settings.forearm_depth
         })
     };
-    (0..FOREARM_POINTS).filter(on).count() >= SEEN_POINTS
+    (0..settings.forearm_points).filter(on).count() >= settings.seen_points
 }
 
 /// Hand of each arm without readings, left and right, camera frame, metres. `pose` changes where an arm is far from its
@@ -41,6 +34,7 @@ pub(crate) fn assign_hands(
     grid: &OrganisedCloud,
     hands: &[P3],
 ) -> [Option<P3d>; 2] {
+    let settings = &model.config.fit.hands;
     let mut out = [None; 2];
     if hands.is_empty() {
         return out;
@@ -49,7 +43,10 @@ pub(crate) fn assign_hands(
     let mut bones = BoneTransforms::default();
     pose.bones(skeleton, rest, &mut bones);
     for (found, arm) in out.iter_mut().zip(&model.arms) {
-        let Some(arm) = arm.as_ref().filter(|a| !is_forearm_seen(a, &bones, grid)) else {
+        let Some(arm) = arm
+            .as_ref()
+            .filter(|a| !is_forearm_seen(a, &bones, grid, settings))
+        else {
             continue;
         };
         let shoulder = bones.joints[arm.root];
@@ -58,7 +55,7 @@ pub(crate) fn assign_hands(
         let is_own = |h: &P3d| {
             let off = (h - shoulder).norm();
             let other = across.map_or(f64::INFINITY, |a| (h - bones.joints[a.root]).norm());
-            off < STRETCH * length && off < other
+            off < settings.stretch * length && off < other
         };
         let distance = |h: &P3d| (h - arm.hand(&bones)).norm();
         let hand = hands
@@ -68,12 +65,12 @@ pub(crate) fn assign_hands(
             .min_by(|a, b| distance(a).total_cmp(&distance(b)));
         if let Some(hand) = hand {
             let mut reached = pose.clone();
-            if distance(&hand) > FOLLOWED {
+            if distance(&hand) > settings.followed {
                 arm.reach(skeleton, rest, &mut reached, &hand, None);
                 reached.bones(skeleton, rest, &mut bones);
             }
             // A fragment of something else, with nothing but air on the way to it, is no hand.
-            if arm.misplaced_points(&bones, grid, None) < AIR_POINTS {
+            if arm.misplaced_points(&bones, grid, None) < settings.air_points {
                 (*pose, *found) = (reached, Some(hand));
             }
             pose.bones(skeleton, rest, &mut bones);

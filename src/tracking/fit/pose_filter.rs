@@ -2,7 +2,6 @@
 //! constant position. A subject at rest shows no sensor noise; a moving part is followed within two frames.
 
 use super::extrapolation::advance_angles;
-use super::solve::limit;
 use crate::model::TrackerModel;
 use nalgebra::Vector3;
 use tryon_body::parts::BodyPart;
@@ -11,66 +10,71 @@ use tryon_geometry::math::{Rigid, exp_so3, log_so3};
 
 /// Parts of the body that are filtered separately.
 const PARTS: usize = BodyPart::ALL.len();
-/// Weight of the newest displacement in its running mean: four frames' memory. Noise averages out of it, motion does not.
-const MEMORY: f64 = 0.25;
-/// Uncertainty of the running mean relative to that of one frame. Smaller follows slow motion closer and trembles more
-/// (0.15 / 0.25: 3.36 / 3.66 mm behind, 0.63 / 0.49 mm from frame to frame).
-const MEAN_UNCERTAINTY: f64 = 0.25;
 
-/// Moves each part from `last` towards `fitted` by the gain v²/(v² + r²).
-///
-/// v is the part's displacement (root mean square over its joints, metres), r the `uncertainty`, metres. `drift` is the
-/// running mean of the displacements (one vector a joint, camera frame, metres; empty at a start). Its gain, at a smaller
-/// uncertainty, counts where it is larger.
-pub(crate) fn filter_pose(
-    model: &TrackerModel,
-    rest: &RestBody,
-    (last, fitted): (&Pose, &Pose),
-    uncertainty: f64,
-    drift: &mut Vec<Vector3<f64>>,
-) -> Pose {
-    let skeleton = model.template.skeleton();
-    let (mut a, mut b) = (BoneTransforms::default(), BoneTransforms::default());
-    last.bones(skeleton, rest, &mut a);
-    fitted.bones(skeleton, rest, &mut b);
-    let gains = part_gains(model, (&a, &b), uncertainty, drift);
-    let mut out = last.clone();
-    let (from, to) = (last.root.iso(), fitted.root.iso());
-    // About the pelvis: a turn about the origin of the rest frame would move the body.
-    let pelvis = a.joints[0].coords + (b.joints[0] - a.joints[0]) * gains[0];
-    let turn = exp_so3(&(log_so3(&(to.rotation * from.rotation.inverse())) * gains[0]));
-    let rotation = turn * from.rotation;
-    out.root = Rigid::from_parts(pelvis - rotation * rest.joints[0].coords, rotation);
-    advance_angles(skeleton, &mut out, (last, fitted), |j| {
-        gains[model.parts[j]]
-    });
-    limit(model, &mut out);
-    out
+/// One frame of the filter.
+pub(crate) struct PoseFilter<'a> {
+    pub model: &'a TrackerModel,
+    pub rest: &'a RestBody,
+    /// Pose expected from the last one.
+    pub last: &'a Pose,
+    /// Fit of the frame.
+    pub fitted: &'a Pose,
+    /// Uncertainty of the fit, metres.
+    pub uncertainty: f64,
 }
 
-/// Gain of each part, 0 to 1; updates the running means.
-fn part_gains(
-    model: &TrackerModel,
-    (last, fitted): (&BoneTransforms, &BoneTransforms),
-    uncertainty: f64,
-    drift: &mut Vec<Vector3<f64>>,
-) -> [f64; PARTS] {
-    drift.resize(model.parts.len(), Vector3::zeros());
-    let mut sums = [[0.0f64; 3]; PARTS];
-    for (j, &part) in model.parts.iter().enumerate() {
-        let off = fitted.joints[j] - last.joints[j];
-        let mean = drift[j] + (off - drift[j]) * MEMORY;
-        drift[j] = mean;
-        let [now, kept, n] = &mut sums[part];
-        *now += off.norm_squared();
-        *kept += mean.norm_squared();
-        *n += 1.0;
+impl PoseFilter<'_> {
+    /// Moves each part from the last pose towards the fit by the gain v²/(v² + r²).
+    ///
+    /// v is the part's displacement (root mean square over its joints, metres), r the uncertainty. `drift` is the running
+    /// mean of the displacements (one vector a joint, camera frame, metres; empty at a start). Its gain, at a smaller
+    /// uncertainty, counts where it is larger.
+    pub(crate) fn filter(&self, drift: &mut Vec<Vector3<f64>>) -> Pose {
+        let (model, skeleton) = (self.model, self.model.template.skeleton());
+        let (mut a, mut b) = (BoneTransforms::default(), BoneTransforms::default());
+        self.last.bones(skeleton, self.rest, &mut a);
+        self.fitted.bones(skeleton, self.rest, &mut b);
+        let gains = self.part_gains(&a, &b, drift);
+        let mut out = self.last.clone();
+        let (from, to) = (self.last.root.iso(), self.fitted.root.iso());
+        // About the pelvis: a turn about the origin of the rest frame would move the body.
+        let pelvis = a.joints[0].coords + (b.joints[0] - a.joints[0]) * gains[0];
+        let turn = exp_so3(&(log_so3(&(to.rotation * from.rotation.inverse())) * gains[0]));
+        let rotation = turn * from.rotation;
+        out.root = Rigid::from_parts(pelvis - rotation * self.rest.joints[0].coords, rotation);
+        advance_angles(skeleton, &mut out, self.last, self.fitted, |j| {
+            gains[model.parts[j]]
+        });
+        out.clamp_to_limits(skeleton);
+        out
     }
-    sums.map(|[now, kept, n]| {
-        let gain = |v2: f64, r: f64| v2 / (v2 + r * r).max(f64::MIN_POSITIVE);
-        let n = n.max(1.0);
-        gain(now / n, uncertainty).max(gain(kept / n, MEAN_UNCERTAINTY * uncertainty))
-    })
+
+    /// Gain of each part, 0 to 1; updates the running means.
+    fn part_gains(
+        &self,
+        last: &BoneTransforms,
+        fitted: &BoneTransforms,
+        drift: &mut Vec<Vector3<f64>>,
+    ) -> [f64; PARTS] {
+        let (parts, settings) = (&self.model.parts, &self.model.config.fit);
+        drift.resize(parts.len(), Vector3::zeros());
+        let mut sums = [[0.0f64; 3]; PARTS];
+        for (j, &part) in parts.iter().enumerate() {
+            let off = fitted.joints[j] - last.joints[j];
+            let mean = drift[j] + (off - drift[j]) * settings.filter_memory;
+            drift[j] = mean;
+            let [now, kept, n] = &mut sums[part];
+            *now += off.norm_squared();
+            *kept += mean.norm_squared();
+            *n += 1.0;
+        }
+        sums.map(|[now, kept, n]| {
+            let gain = |v2: f64, r: f64| v2 / (v2 + r * r).max(f64::MIN_POSITIVE);
+            let n = n.max(1.0);
+            let mean = settings.mean_uncertainty * self.uncertainty;
+            gain(now / n, self.uncertainty).max(gain(kept / n, mean))
+        })
+    }
 }
 
 #[cfg(test)]
@@ -105,9 +109,14 @@ mod tests {
         }
         /// Filters one frame; returns the pose before it.
         fn step(&mut self, fitted: &Pose, uncertainty: f64) -> Pose {
-            let (model, rest) = (&self.scene.model, &self.scene.rest);
-            let poses = (&self.pose, fitted);
-            let next = filter_pose(model, rest, poses, uncertainty, &mut self.drift);
+            let filter = PoseFilter {
+                model: &self.scene.model,
+                rest: &self.scene.rest,
+                last: &self.pose,
+                fitted,
+                uncertainty,
+            };
+            let next = filter.filter(&mut self.drift);
             std::mem::replace(&mut self.pose, next)
         }
     }

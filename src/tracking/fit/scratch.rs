@@ -1,10 +1,11 @@
 //! Inputs and scratch of the pose fit.
 
-use super::schedule::{FitTerms, START_TERMS};
+use super::terms::FitTerms;
 use crate::model::{PersonalBody, TrackerModel};
 use crate::registration::{
     Dof, EdgePairs, ModelPoints, NormalEquations, Observation, Pair, PairingScratch, ROOT_UNKNOWNS,
 };
+use crate::settings::FitSettings;
 use nalgebra::{Matrix3, Vector3};
 use tryon_body::{BoneTransforms, Pose};
 use tryon_geometry::math::{P3, V3};
@@ -40,7 +41,7 @@ pub(crate) struct FitScratch {
 impl Default for FitScratch {
     fn default() -> Self {
         Self {
-            terms: START_TERMS,
+            terms: FitTerms::start(&FitSettings::default()),
             bones: BoneTransforms::default(),
             positions: Vec::new(),
             normals: Vec::new(),
@@ -80,12 +81,7 @@ impl FitScratch {
 
     /// Number of point residuals of the current pairs.
     pub(crate) fn residuals(&self) -> usize {
-        let free = if self.terms.free_space > 0.0 {
-            self.pairing.in_front.len()
-        } else {
-            0
-        };
-        self.pairs.len() + self.edges.pairs.len() + free
+        self.pairs.len() + self.edges.pairs.len()
     }
 
     /// Origin of the twists: the root joint, camera frame, metres.

@@ -1,15 +1,11 @@
 //! Damped Gauss–Newton iterations of the pose, and the cost by which poses of one frame compare.
 
-use super::equations::{PoseSums, UNEXPLAINED, assemble, for_each_point, pair};
+use super::equations::{PoseSums, assemble, for_each_point, pair};
 use super::extrapolation::LEVER;
-use super::schedule::{ANNEAL, Schedule};
 use super::scratch::{FitContext, FitScratch};
-use crate::model::TrackerModel;
 use crate::registration::{PairingStats, apply};
+use crate::settings::{FitSettings, Schedule};
 use tryon_body::Pose;
-
-/// Width of the kernel in comparisons of poses, metres.
-const COMPARED_SIGMA: f64 = 0.05;
 
 /// Result of a fit.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -28,19 +24,19 @@ pub(crate) struct FitReport {
 }
 
 impl FitReport {
-    fn new(pairs: PairingStats, sums: PoseSums, iterations: usize) -> Self {
+    fn new(pairs: PairingStats, sums: PoseSums, settings: &FitSettings) -> Self {
         let judged = pairs.visible - pairs.unknown;
         let missing = (pairs.readings - pairs.explained) + (judged - pairs.from_model);
         let all = (pairs.readings + judged).max(1) as f64;
         Self {
-            iterations,
+            iterations: 0,
             converged: false,
             residual: if sums.weight > 0.0 {
                 sums.distance / sums.weight
             } else {
                 0.0
             },
-            cost: (sums.cost + missing as f64 * UNEXPLAINED * UNEXPLAINED) / all,
+            cost: (sums.cost + missing as f64 * settings.unexplained * settings.unexplained) / all,
             explained: pairs.explained as f64 / pairs.readings.max(1) as f64,
             matched: pairs.from_model as f64 / judged.max(1) as f64,
             pairs,
@@ -55,10 +51,17 @@ pub(crate) fn evaluate(
     distance: f32,
     scratch: &mut FitScratch,
 ) -> FitReport {
+    let settings = &context.model.config.fit;
     let stats = pair(context, pose, distance, 0.0, scratch);
     let point_to_point = context.model.config.point_to_point;
-    let sums = for_each_point(context, scratch, COMPARED_SIGMA, point_to_point, |_| {});
-    FitReport::new(stats, sums, 0)
+    let sums = for_each_point(
+        context,
+        scratch,
+        settings.compared_sigma,
+        point_to_point,
+        |_| {},
+    );
+    FitReport::new(stats, sums, settings)
 }
 
 /// Fits `pose` to the readings: Gauss–Newton with damping, joint limits and a weak pull to the rest pose.
@@ -69,16 +72,18 @@ pub(crate) fn fit_pose(
     scratch: &mut FitScratch,
 ) -> FitReport {
     let model = context.model;
+    let settings = &model.config.fit;
     let mut report = FitReport::default();
     for iteration in 0..schedule.iterations {
-        let t = ((iteration + schedule.ahead) as f64 / ANNEAL as f64).min(1.0);
+        let t = ((iteration + schedule.ahead) as f64 / settings.anneal as f64).min(1.0);
         let sigma = schedule.sigma[0] + (schedule.sigma[1] - schedule.sigma[0]) * t;
         let distance =
             schedule.distance[0] + (schedule.distance[1] - schedule.distance[0]) * t as f32;
         let pull = if t < 1.0 { schedule.pull } else { 0.0 };
         let stats = pair(context, pose, distance, pull, scratch);
         let sums = assemble(context, pose, sigma, model.config.point_to_point, scratch);
-        report = FitReport::new(stats, sums, iteration + 1);
+        report = FitReport::new(stats, sums, settings);
+        report.iterations = iteration + 1;
         if sums.weight < 1.0 {
             break;
         }
@@ -87,7 +92,7 @@ pub(crate) fn fit_pose(
             break;
         };
         apply(model.template.skeleton(), pose, &scratch.centre(), &x);
-        limit(model, pose);
+        pose.clamp_to_limits(model.template.skeleton());
         let step = x
             .iter()
             .enumerate()
@@ -101,17 +106,10 @@ pub(crate) fn fit_pose(
     report
 }
 
-/// Clamps joints to their limits, where those are configured.
-pub(crate) fn limit(model: &TrackerModel, pose: &mut Pose) {
-    if model.config.joint_limits {
-        pose.clamp_to_limits(model.template.skeleton());
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::fit::schedule::{FitTerms, TRACK};
+    use crate::fit::terms::FitTerms;
     use crate::test_scene::{DepthScan, TestScene};
     use nalgebra::{Translation3, Vector3};
     use tryon_geometry::camera::DepthImage;
@@ -142,7 +140,7 @@ mod tests {
             terms: FitTerms::tracking(&scene.model.config),
             ..FitScratch::default()
         };
-        fit_pose(&context, pose, &TRACK, &mut scratch)
+        fit_pose(&context, pose, &scene.model.config.fit.track, &mut scratch)
     }
 
     #[test]

@@ -2,6 +2,7 @@
 
 use crate::model::{Leg, TrackerModel};
 use crate::registration::residual::{FloorPlane, is_in_view};
+use crate::settings::StandingSettings;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 use tryon_body::{BoneTransforms, Pose, RestBody};
@@ -22,12 +23,6 @@ pub(crate) struct FloorStance {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub(crate) struct FootMemory(pub [[Vector3<f64>; 2]; 2]);
 
-/// Share of the difference by which the remembered place and direction follow the found ones per frame. A place follows
-/// within ten frames; a direction, which the readings hold less, within sixty.
-const MEMORY_GAIN: [f64; 2] = [0.3, 0.05];
-/// Share of the difference by which the greatest height of the hips follows a greater one per frame: noise averages out.
-const RISE: f64 = 0.1;
-
 impl FootMemory {
     /// Feet of a posed body.
     pub(crate) fn of(model: &TrackerModel, joints: &[P3d]) -> Self {
@@ -44,12 +39,15 @@ impl FootMemory {
         Self(out)
     }
     /// Memory after one more frame.
-    pub(crate) fn updated(self, now: Self) -> Self {
+    pub(crate) fn updated(self, now: Self, settings: &StandingSettings) -> Self {
         let mut out = self;
         for (kept, (was, is)) in out.0.iter_mut().zip(self.0.iter().zip(&now.0)) {
-            let ankle = was[0] + (is[0] - was[0]) * MEMORY_GAIN[0];
+            let ankle = was[0] + (is[0] - was[0]) * settings.memory_gain[0];
             let (before, after) = (was[1] - was[0], is[1] - is[0]);
-            *kept = [ankle, ankle + before + (after - before) * MEMORY_GAIN[1]];
+            *kept = [
+                ankle,
+                ankle + before + (after - before) * settings.memory_gain[1],
+            ];
         }
         out
     }
@@ -81,14 +79,6 @@ pub(crate) fn planted(
     out
 }
 
-/// Depth of a hidden foot below the floor that starts a search for a bent knee, metres: from a straight leg, a descent
-/// leads down first.
-const BELOW: f64 = 0.03;
-/// Step of the search over knee angles, radians: 2 cm of the foot.
-const BEND_STEP: f64 = 0.05;
-/// Share of a knee (0 to 1) without readings from which its bend is free to choose.
-const FREE: f64 = 0.5;
-
 /// Knees without readings over a floor, at the pose of the last normal equations.
 #[derive(Clone, Copy)]
 pub(crate) struct HiddenKnees<'a> {
@@ -104,6 +94,7 @@ pub(crate) struct HiddenKnees<'a> {
 impl HiddenKnees<'_> {
     /// Bends the knees whose feet are below the floor by the least angle that lifts them onto it.
     pub(crate) fn bend(&self, pose: &mut Pose) {
+        let settings = &self.model.config.fit.standing;
         let (skeleton, floor) = (self.model.template.skeleton(), self.floor);
         let mut bones = BoneTransforms::default();
         for leg in &self.model.standing {
@@ -112,7 +103,10 @@ impl HiddenKnees<'_> {
             else {
                 continue;
             };
-            let is_free = self.unseen.get(knee).is_some_and(|share| *share >= FREE);
+            let is_free = self
+                .unseen
+                .get(knee)
+                .is_some_and(|share| *share >= settings.free);
             if !is_free || is_in_view(self.grid, &self.joints[ankle]) {
                 continue;
             }
@@ -120,12 +114,12 @@ impl HiddenKnees<'_> {
                 pose.bones(skeleton, self.rest, &mut bones);
                 floor.height + height - floor.up.dot(&bones.joints[ankle].coords)
             };
-            if below(pose) < BELOW {
+            if below(pose) < settings.below {
                 continue;
             }
             let mut bent = pose.clone();
-            while bent.angles[knee] + BEND_STEP < limits[1] {
-                bent.angles[knee] += BEND_STEP;
+            while bent.angles[knee] + settings.bend_step < limits[1] {
+                bent.angles[knee] += settings.bend_step;
                 if below(&bent) < 0.0 {
                     *pose = bent;
                     break;
@@ -142,11 +136,12 @@ pub(crate) fn highest_hips(
     known: Option<f64>,
     joints: &[P3d],
 ) -> Option<f64> {
+    let settings = &model.config.fit.standing;
     let hips = model.standing.iter().filter_map(|leg| joints.get(leg.hip));
     let height = hips
         .map(|p| up.dot(&p.coords))
         .fold(None, |a: Option<f64>, b| Some(a.map_or(b, |a| a.min(b))))?;
-    Some(known.map_or(height, |k| k + RISE * (height - k).max(0.0)))
+    Some(known.map_or(height, |k| k + settings.rise * (height - k).max(0.0)))
 }
 
 /// Height of an unseen floor along the upright, metres: the length of straight legs below the highest hips.
@@ -200,12 +195,12 @@ mod tests {
     #[test]
     fn foot_memory_converges_at_its_gains() {
         let x = |a: f64, b: f64| FootMemory([[Vector3::x() * a, Vector3::x() * (a + b)]; 2]);
-        let mut kept = x(0.0, 0.1);
-        assert_eq!(kept.updated(kept), kept);
+        let (mut kept, settings) = (x(0.0, 0.1), StandingSettings::default());
+        assert_eq!(kept.updated(kept, &settings), kept);
         for _ in 0..10 {
-            kept = kept.updated(x(1.0, 0.2));
+            kept = kept.updated(x(1.0, 0.2), &settings);
         }
-        let [place, direction] = MEMORY_GAIN.map(|f| (1.0 - f).powi(10));
+        let [place, direction] = settings.memory_gain.map(|f| (1.0 - f).powi(10));
         let [ankle, ball] = kept.0[0];
         assert!((ankle.x - (1.0 - place)).abs() < 1e-12, "{ankle}");
         assert!(

@@ -1,5 +1,6 @@
 //! Arms and legs as chains of a ball, a hinge and an end; two-bone inverse kinematics by the law of cosines.
 
+use crate::settings::ModelSettings;
 use nalgebra::{UnitQuaternion, Vector3};
 use tryon_body::parts::{BodyPart, EllipticColumn, LimbJoints};
 use tryon_body::{BoneTransforms, JointMotion, Pose, RestBody, Skeleton, Template};
@@ -23,29 +24,26 @@ pub(crate) struct Limb {
     bend: usize,
     /// Point that stands for hand or foot, as a share of the way from end to tip.
     middle: f64,
+    /// Depth by which a point lies before a reading when it is in the air, metres.
+    air: f64,
 }
 
-/// Share of the way from wrist to fingertip: readings of a hand half in its sleeve are the fingers.
-const HAND: f64 = 0.7;
-/// Share of the way from ankle to toes, for a foot that hangs or points at the camera.
-const FOOT: f64 = 0.5;
-
-/// Points of a bone that are tested for free space, and the depth by which they lie before a reading, metres.
+/// Points of a bone that are tested for free space.
 const AIR_SAMPLES: usize = 5;
-/// See [`AIR_SAMPLES`].
-const AIR: f64 = 0.10;
 
 /// The arms of a template, left and right; `None` for one without.
-pub(crate) fn arms(template: &Template) -> [Option<Limb>; 2] {
-    [BodyPart::LeftArm, BodyPart::RightArm].map(|arm| limb(template, arm, HAND))
+pub(crate) fn arms(template: &Template, settings: &ModelSettings) -> [Option<Limb>; 2] {
+    [BodyPart::LeftArm, BodyPart::RightArm]
+        .map(|arm| limb(template, arm, settings.hand, settings.air))
 }
 
 /// The legs of a template, left and right; `None` for one without.
-pub(crate) fn legs(template: &Template) -> [Option<Limb>; 2] {
-    [BodyPart::LeftLeg, BodyPart::RightLeg].map(|leg| limb(template, leg, FOOT))
+pub(crate) fn legs(template: &Template, settings: &ModelSettings) -> [Option<Limb>; 2] {
+    [BodyPart::LeftLeg, BodyPart::RightLeg]
+        .map(|leg| limb(template, leg, settings.foot, settings.air))
 }
 
-fn limb(template: &Template, part: BodyPart, middle: f64) -> Option<Limb> {
+fn limb(template: &Template, part: BodyPart, middle: f64, air: f64) -> Option<Limb> {
     let skeleton = template.skeleton();
     let LimbJoints {
         root,
@@ -64,6 +62,7 @@ fn limb(template: &Template, part: BodyPart, middle: f64) -> Option<Limb> {
         angles: vec![s, s + 1, s + 2, bend],
         bend,
         middle,
+        air,
     })
 }
 
@@ -98,7 +97,7 @@ impl Limb {
             // A sleeve without return looks like a background that was removed.
             let is_measured = |c: &usize| grid.labels[*c] != Label::Unknown && grid.depth[*c] > 0.0;
             let cell = cell.filter(is_measured);
-            cell.is_some_and(|c| p.z < f64::from(grid.depth[c]) - AIR)
+            cell.is_some_and(|c| p.z < f64::from(grid.depth[c]) - self.air)
         };
         let bones = [(root, hinge), (hinge, self.hand(bones))];
         let points = bones.into_iter().flat_map(along);

@@ -1,6 +1,5 @@
 //! Immutable parts of a tracker: settings, template with samples, limbs, trunk and classes, the rest body of a shape.
 
-mod config;
 mod leg;
 mod limb;
 pub mod part_classes;
@@ -8,7 +7,6 @@ mod personal_body;
 mod tracker;
 mod trunk;
 
-pub use config::TrackerConfig;
 pub(crate) use leg::Leg;
 pub(crate) use limb::Limb;
 pub use part_classes::PartClasses;

@@ -1,12 +1,11 @@
 //! Immutable part of a tracker: template, camera, sample points, limbs and priors.
 
-use super::config::TrackerConfig;
 use super::leg::{Leg, legs};
 use super::limb::{self, Limb};
 use super::part_classes::PartClasses;
 use super::trunk::Trunk;
-use crate::registration::Association;
 use crate::segment::part_forest::PartForest;
+use crate::settings::{Association, TrackerConfig};
 use nalgebra::{Point3, Vector3};
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -117,12 +116,12 @@ impl TrackerModel {
         }
         let first = directions.len();
         directions.extend(bone_directions(&template, &samples, &weights));
-        let tied = tied_bones(&template, &directions, first);
+        let tied = tied_bones(&template, &directions, first, config.model.tie_weights);
         let stiffness = per_angle(&template, stiffness);
         let standing = legs(&template);
-        let arms = limb::arms(&template);
-        let trunk = Trunk::new(&template, &arms);
-        let legs = limb::legs(&template);
+        let arms = limb::arms(&template, &config.model);
+        let trunk = Trunk::new(&template, &arms, config.model.trunk_slack);
+        let legs = limb::legs(&template, &config.model);
         let parts = (0..skeleton.len())
             .map(|j| template.parts().part(j) as usize)
             .collect();
@@ -278,14 +277,12 @@ fn bone_directions(template: &Template, samples: &[u32], weights: &SkinWeights) 
     out
 }
 
-/// Weight of eq. 23 between left and right bones, and between successive bones of a limb.
-const TIE_WEIGHTS: [f64; 2] = [1.0, 0.5];
-
 /// Pairs of bone scales tied by eq. 23.
 fn tied_bones(
     template: &Template,
     directions: &[Direction],
     first: usize,
+    [twin_weight, chain_weight]: [f64; 2],
 ) -> Vec<(usize, usize, f64)> {
     let (joints, parts) = (template.skeleton().joints(), template.parts());
     let of = |j: usize| directions.iter().position(|d| d.bone == Some(j));
@@ -294,14 +291,9 @@ fn tied_bones(
         let Some(j) = d.bone else { continue };
         if parts.side(j) == Some(BodySide::Left) {
             let twin = parts.twin(j).and_then(of);
-            out.extend(twin.map(|k| (i, k, TIE_WEIGHTS[0])));
+            out.extend(twin.map(|k| (i, k, twin_weight)));
         }
-        out.extend(
-            joints[j]
-                .parent
-                .and_then(of)
-                .map(|k| (i, k, TIE_WEIGHTS[1])),
-        );
+        out.extend(joints[j].parent.and_then(of).map(|k| (i, k, chain_weight)));
     }
     out
 }

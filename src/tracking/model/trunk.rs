@@ -4,9 +4,6 @@ use super::limb::Limb;
 use tryon_body::parts::{EllipticColumn, EllipticSection, TrunkFrame};
 use tryon_body::{BodyShape, BoneTransforms, Template};
 
-/// Share of the section that counts as inside: hands press into clothes and soft bodies.
-const SLACK: f64 = 0.65;
-
 /// Trunk between the hips and the shoulders.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Trunk {
@@ -16,11 +13,13 @@ pub(crate) struct Trunk {
     /// shares of the distance between the shoulders.
     half: [f64; 2],
     front: f64,
+    /// Share of the section that counts as inside.
+    slack: f64,
 }
 
 impl Trunk {
     /// The trunk of a template with these arms, root joint at the pelvis; `None` for one without arms.
-    pub(crate) fn new(template: &Template, arms: &[Option<Limb>; 2]) -> Option<Self> {
+    pub(crate) fn new(template: &Template, arms: &[Option<Limb>; 2], slack: f64) -> Option<Self> {
         let shoulders = [arms[0].as_ref()?.root, arms[1].as_ref()?.root];
         let rest = template.personalise(&BodyShape::default()).joints;
         let frame = TrunkFrame::new(rest[0], shoulders.map(|j| rest[j]))?;
@@ -30,6 +29,7 @@ impl Trunk {
             shoulders,
             half: section.half.map(|h| h / frame.width),
             front: section.front / frame.width,
+            slack,
         })
     }
 
@@ -40,7 +40,7 @@ impl Trunk {
         Some(EllipticColumn {
             base: frame.pelvis + frame.axes[2] * (self.front * frame.width),
             axes: frame.axes,
-            half: self.half.map(|h| SLACK * h * frame.width),
+            half: self.half.map(|h| self.slack * h * frame.width),
             height: frame.height,
         })
     }
@@ -50,14 +50,15 @@ impl Trunk {
 mod tests {
     use super::*;
     use crate::model::limb;
+    use crate::settings::ModelSettings;
     use tryon_body::{Pose, embedded};
     use tryon_geometry::math::{Body, Camera, Rigid};
 
     #[test]
     fn arms_at_rest_are_outside_and_a_point_in_the_chest_is_inside() {
         let template = embedded::template();
-        let arms = limb::arms(&template);
-        let trunk = Trunk::new(&template, &arms).expect("a trunk");
+        let arms = limb::arms(&template, &ModelSettings::default());
+        let trunk = Trunk::new(&template, &arms, 0.65).expect("a trunk");
         let pose = Pose::rest(template.skeleton(), Rigid::<Camera, Body>::identity());
         let mut bones = BoneTransforms::default();
         pose.bones(

@@ -3,7 +3,6 @@
 //! Nothing keeps such a limb from drifting out of the subject's outline as the body turns. Its points in free
 //! space are drawn to the nearest readings of the subject, and behind them, by Gauss–Newton on the angles of the limb.
 
-use crate::assess::APART;
 use crate::fit::FitContext;
 use crate::model::Limb;
 use nalgebra::{Point3, SMatrix, SVector, Vector3};
@@ -11,16 +10,8 @@ use tryon_body::{BoneTransforms, Pose};
 use tryon_geometry::math::P3;
 use tryon_geometry::spatial::Label;
 
-/// Gauss–Newton iterations: with the bound of a step they turn a limb by half a turn.
-const ITERATIONS: usize = 6;
-/// Distance of a hidden bone inside the outline and behind the readings, metres: the radius of a limb.
-const INSET: f32 = 0.05;
 /// Step of the finite differences and bound of an angle's step, radians.
 const STEP: f64 = 1e-4;
-/// See [`STEP`].
-const MOST_STEP: f64 = 0.5;
-/// Damping per point, metres² over radians²: angles that no point needs stay.
-const DAMPING: f64 = 2e-3;
 /// Points of a limb: middle of the upper bone, hinge, middle of the lower bone, end, hand or foot.
 const POINTS: usize = 5;
 /// Angles of a limb: a ball and a hinge.
@@ -37,9 +28,10 @@ pub(crate) struct HiddenLimb<'a> {
 impl HiddenLimb<'_> {
     /// The pose with the limb behind the subject's readings; `None` where it is there already.
     pub(crate) fn behind_readings(&self, pose: &Pose, bones: &mut BoneTransforms) -> Option<Pose> {
+        let settings = &self.context.model.config.recover.hidden;
         let mut pose = pose.clone();
         let mut is_moved = false;
-        for _ in 0..ITERATIONS {
+        for _ in 0..settings.iterations {
             let points = self.points(&pose, bones);
             let targets = points.map(|p| self.target(&p));
             if targets.iter().all(Option::is_none) {
@@ -59,6 +51,7 @@ impl HiddenLimb<'_> {
         targets: &[Option<Vector3<f64>>; POINTS],
         bones: &mut BoneTransforms,
     ) {
+        let settings = &self.context.model.config.recover.hidden;
         let mut residual = Residual::zeros();
         for (k, target) in targets.iter().enumerate() {
             let off = target.map_or_else(Vector3::zeros, |t| t - points[k].coords);
@@ -79,14 +72,14 @@ impl HiddenLimb<'_> {
 
         let mut normal = jacobian.transpose() * jacobian;
         for k in 0..ANGLES {
-            normal[(k, k)] += DAMPING;
+            normal[(k, k)] += settings.damping;
         }
         let Some(factor) = normal.cholesky() else {
             return;
         };
         let change = factor.solve(&(jacobian.transpose() * residual));
         for (&angle, step) in self.limb.angles.iter().zip(change.iter()) {
-            pose.angles[angle] += step.clamp(-MOST_STEP, MOST_STEP);
+            pose.angles[angle] += step.clamp(-settings.most_step, settings.most_step);
         }
         pose.clamp_to_limits(self.context.model.template.skeleton());
     }
@@ -101,13 +94,14 @@ impl HiddenLimb<'_> {
 
     /// Place behind the subject's readings for a point in measured free space, camera frame, metres; `None` for others.
     fn target(&self, p: &Point3<f64>) -> Option<Vector3<f64>> {
+        let settings = &self.context.model.config.recover.hidden;
         let grid = self.context.observation.grid;
         let p: P3 = p.cast();
         let at = grid.project(&p)?;
         let (column, row) = grid.cell_of(&p)?;
         let cell = grid.cell(column, row)?;
         let (label, depth) = (grid.labels[cell], grid.depth[cell]);
-        let is_before = depth > 0.0 && p.z < depth - APART;
+        let is_before = depth > 0.0 && p.z < depth - self.context.model.config.assess.apart;
         let is_free = match label {
             Label::Unknown => false,
             Label::Background if depth == 0.0 => true,
@@ -125,11 +119,11 @@ impl HiddenLimb<'_> {
         let shown = self.context.observation.cells.iter();
         let shown = shown.filter(|c| grid.depth[**c as usize] > 0.0);
         let near = *shown.min_by(|a, b| distance(a).total_cmp(&distance(b)))?;
-        let z = p.z.max(grid.depth[near as usize] + INSET);
+        let z = p.z.max(grid.depth[near as usize] + settings.inset);
         let (u, v) = (near as usize % columns, near as usize / columns);
         let [du, dv] = [u as f32 - at[0], v as f32 - at[1]];
         let far = du.hypot(dv);
-        let inset = INSET * grid.focal()[0] / z;
+        let inset = settings.inset * grid.focal()[0] / z;
         let share = if label == Label::Person || far <= 0.0 {
             1.0
         } else {

@@ -1,17 +1,8 @@
 //! Correspondences between model points and depth readings: inputs, result and settings of the search.
 
+use crate::settings::{Association, RegistrationSettings};
 use tryon_geometry::math::{P3, V3};
 use tryon_geometry::spatial::{OrganisedCloud, PointTree};
-
-/// Method of the correspondence search.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
-pub enum Association {
-    /// Search windows in the images, both ways.
-    #[default]
-    Projective,
-    /// Exact nearest neighbours in space by kd-tree, both ways (the paper's choice, from the model to the data).
-    KdTree,
-}
 
 /// Depth readings of the subject in one frame, camera frame.
 #[derive(Clone, Copy)]
@@ -61,15 +52,12 @@ pub struct PairingConfig {
     pub association: Association,
     /// Longest pair, metres (Table 1: 0.2).
     pub distance: f32,
-    /// Smallest cosine between the normals (Table 1: 60°).
-    pub cos_normal: f32,
     /// Reach of the pull from readings without a pair to the model, metres; 0 switches it off.
     pub pull: f32,
     /// Stride over readings in the search from the data to the model.
     pub data_step: usize,
-    /// Displacement up to which a point keeps its tree query's answer, metres; 0 queries always. A kept pair is longer
-    /// than the shortest by at most twice this. [`super::PairingScratch::forget`] when readings change.
-    pub reuse: f32,
+    /// Bounds that hold for every iteration.
+    pub settings: RegistrationSettings,
 }
 
 /// Counts of one search.

@@ -9,10 +9,9 @@ pub(crate) mod normal_equations;
 pub(crate) mod pairing;
 pub mod residual;
 
-pub use correspondence::{
-    Association, ModelPoints, Observation, Pair, PairingConfig, PairingStats,
-};
-pub use edge_pairs::{EdgePairs, EdgeSide, pair_edges};
+pub use crate::settings::Association;
+pub use correspondence::{ModelPoints, Observation, Pair, PairingConfig, PairingStats};
+pub use edge_pairs::{EdgePairs, pair_edges};
 pub use index_image::IndexImage;
 #[cfg(test)]
 pub(crate) use kinematics::tests::arm;

@@ -9,8 +9,6 @@ use tryon_geometry::spatial::{Label, PointTree};
 pub struct PairingScratch {
     /// The model drawn into the grid.
     pub image: IndexImage,
-    /// Model points in free space: in front of a farther reading of the subject, with its cell.
-    pub in_front: Vec<(u32, u32)>,
     facing: Vec<u32>,
     facing_points: Vec<P3>,
     /// Per model point: position at its last tree query, and the cell found ([`NO_ANSWER`] without one).
@@ -37,23 +35,6 @@ impl PairingScratch {
 
 /// Absent answer of a tree query.
 const NO_ANSWER: u32 = u32::MAX;
-/// Depth behind the drawn surface up to which a model point counts as visible (relaxed visibility), metres. Larger:
-/// occluded limbs pair with what covers them; smaller: noise hides points.
-const RELAXED_VISIBILITY: f32 = 0.05;
-/// Clearance in front of the subject's reading beyond which a model point is in free space, metres: loose clothes and
-/// the error of a body not yet adapted stay below it.
-const IN_FRONT: f32 = 0.06;
-/// Cosine between normal and view ray below which a model point is grazing and takes no pair: its reading is unreliable.
-const FACING: f32 = 0.1;
-/// Least depth that sizes a search window, metres; bounds the window of points at the lens.
-const NEAREST_DEPTH: f32 = 0.1;
-/// Largest half width of a window, cells, from the model and from the data: time against reach.
-const MAX_WINDOW: [i32; 2] = [12, 6];
-/// Half width above which a window is sampled at every second cell: what it misses, the next iteration finds.
-const THINNED_WINDOW: [i32; 2] = [4, 3];
-/// Stride over readings without a pair that pull on the model: each scans all facing points.
-const PULL_STRIDE: usize = 3;
-
 /// True for the same bone or neighbours in the tree: eq. 9 relaxed at joints, whose points belong to either side.
 fn is_consistent(parents: &[Option<usize>], a: u8, b: u8) -> bool {
     let (a, b) = (usize::from(a), usize::from(b));
@@ -106,15 +87,15 @@ impl PairSearch<'_> {
         pairs: &mut Vec<Pair>,
         stats: &mut PairingStats,
     ) {
+        let settings = &self.config.settings;
         let (model, grid) = (self.model, self.observation.grid);
         scratch
             .reading_cache
             .resize(model.positions.len(), (P3::origin(), NO_ANSWER));
         scratch.facing.clear();
         scratch.facing_points.clear();
-        scratch.in_front.clear();
         for (i, (p, n)) in model.positions.iter().zip(model.normals).enumerate() {
-            if n.dot(&p.coords) > -FACING * p.coords.norm() {
+            if n.dot(&p.coords) > -settings.least_facing * p.coords.norm() {
                 continue;
             }
             scratch.facing.push(i as u32);
@@ -125,19 +106,16 @@ impl PairSearch<'_> {
             let Some(home) = grid.cell(u, v) else {
                 continue;
             };
-            if p.z > scratch.image.depth[home] + RELAXED_VISIBILITY {
+            if p.z > scratch.image.depth[home] + settings.relaxed_visibility {
                 continue;
             }
             stats.visible += 1;
-            if grid.labels[home] == Label::Person && grid.depth[home] > p.z + IN_FRONT {
-                scratch.in_front.push((i as u32, home as u32));
-            }
             let best = match self.tree {
                 Some(tree) => {
                     let cache = &mut scratch.reading_cache[i];
                     self.nearest_reading(tree, p, n, cache, &mut stats.reused)
                 }
-                None => self.reading_in_window((u, v), p, n),
+                None => self.reading_in_window(u, v, p, n),
             };
             let Some(cell) = best else {
                 stats.unknown += usize::from(grid.labels[home] == Label::Unknown);
@@ -168,6 +146,7 @@ impl PairSearch<'_> {
         pairs: &mut Vec<Pair>,
         stats: &mut PairingStats,
     ) {
+        let settings = &self.config.settings;
         let (model, grid) = (self.model, self.observation.grid);
         let mut cache = std::mem::take(&mut scratch.point_cache);
         let tree = self.refresh_point_tree(&scratch.facing_points, &mut cache);
@@ -198,8 +177,8 @@ impl PairSearch<'_> {
                 };
                 self.compatible_point(i, &c, &n)
             } else {
-                let home = ((k % columns) as i32, (k / columns) as i32);
-                self.point_in_window(home, &scratch.image, &c, &n)
+                let (u, v) = ((k % columns) as i32, (k / columns) as i32);
+                self.point_in_window(u, v, &scratch.image, &c, &n)
             };
             let pulled = if best.is_some() {
                 stats.explained += 1;
@@ -207,7 +186,7 @@ impl PairSearch<'_> {
             } else if self.config.pull > 0.0 {
                 unexplained += 1;
                 unexplained
-                    .is_multiple_of(PULL_STRIDE)
+                    .is_multiple_of(settings.pull_stride)
                     .then(|| pull_target(model, scratch, &c, &n, self.config.pull))
                     .flatten()
             } else {
@@ -224,7 +203,7 @@ impl PairSearch<'_> {
 
     /// True within the displacement that keeps an earlier answer.
     fn is_near(&self, a: &P3, b: &P3) -> bool {
-        (a - b).norm_squared() <= self.config.reuse * self.config.reuse
+        (a - b).norm_squared() <= self.config.settings.reuse * self.config.settings.reuse
     }
 
     fn is_short(&self, a: &P3, b: &P3) -> bool {
@@ -233,8 +212,10 @@ impl PairSearch<'_> {
 
     /// Half width of a search window at depth `z`, cells.
     fn window(&self, z: f32) -> i32 {
-        let cells = (self.config.distance * self.focal / z.max(NEAREST_DEPTH)).ceil() as i32;
-        cells.clamp(1, MAX_WINDOW[0])
+        let settings = &self.config.settings;
+        let cells =
+            (self.config.distance * self.focal / z.max(settings.nearest_depth)).ceil() as i32;
+        cells.clamp(1, settings.max_window[0])
     }
 
     /// Nearest reading by tree, or the cached one, when it passes distance, edge and normal.
@@ -260,36 +241,47 @@ impl PairSearch<'_> {
             .then_some(cell as usize)
             .filter(|&k| self.is_short(&grid.points[k], p))
             .filter(|&k| {
-                !observation.false_edges[k] && grid.normals[k].dot(n) >= self.config.cos_normal
+                !observation.false_edges[k]
+                    && grid.normals[k].dot(n) >= self.config.settings.cos_normal
             })
     }
 
-    fn reading_in_window(&self, home: (i32, i32), p: &P3, n: &V3) -> Option<usize> {
+    fn reading_in_window(&self, u: i32, v: i32, p: &P3, n: &V3) -> Option<usize> {
         let (grid, observation) = (self.observation.grid, self.observation);
         let radius = self.window(p.z);
-        let stride = if radius > THINNED_WINDOW[0] { 2 } else { 1 };
-        self.closest_in_window(home, radius, stride, |k, bound| {
+        let stride = if radius > self.config.settings.thinned_window[0] {
+            2
+        } else {
+            1
+        };
+        self.closest_in_window(u, v, radius, stride, |k, bound| {
             if grid.labels[k] != Label::Person {
                 return None;
             }
             let d = (grid.points[k] - p).norm_squared();
             let fits = d < bound
-                && grid.normals[k].dot(n) >= self.config.cos_normal
+                && grid.normals[k].dot(n) >= self.config.settings.cos_normal
                 && !observation.false_edges[k];
             fits.then_some((d, k))
         })
     }
 
-    fn point_in_window(&self, home: (i32, i32), image: &IndexImage, c: &P3, n: &V3) -> Option<u32> {
-        let radius = self.window(c.z).min(MAX_WINDOW[1]);
-        let stride = if radius > THINNED_WINDOW[1] { 2 } else { 1 };
-        self.closest_in_window(home, radius, stride, |k, bound| {
+    fn point_in_window(&self, u: i32, v: i32, image: &IndexImage, c: &P3, n: &V3) -> Option<u32> {
+        let settings = &self.config.settings;
+        let radius = self.window(c.z).min(settings.max_window[1]);
+        let stride = if radius > settings.thinned_window[1] {
+            2
+        } else {
+            1
+        };
+        self.closest_in_window(u, v, radius, stride, |k, bound| {
             let i = image.index[k];
             if i == IndexImage::NONE {
                 return None;
             }
             let d = (self.model.positions[i as usize] - c).norm_squared();
-            let fits = d < bound && self.model.normals[i as usize].dot(n) >= self.config.cos_normal;
+            let fits = d < bound
+                && self.model.normals[i as usize].dot(n) >= self.config.settings.cos_normal;
             fits.then_some((d, i))
         })
     }
@@ -299,7 +291,8 @@ impl PairSearch<'_> {
     #[inline]
     fn closest_in_window<T>(
         &self,
-        (u, v): (i32, i32),
+        u: i32,
+        v: i32,
         radius: i32,
         stride: i32,
         candidate: impl Fn(usize, f32) -> Option<(f32, T)>,
@@ -326,7 +319,7 @@ impl PairSearch<'_> {
     /// Builds a tree over the facing points and empties the cache, unless all cached answers still hold.
     fn refresh_point_tree(&self, facing: &[P3], cache: &mut PointCache) -> Option<PointTree> {
         let positions = self.model.positions;
-        let holds = self.config.reuse > 0.0
+        let holds = self.config.settings.reuse > 0.0
             && cache.positions.len() == positions.len()
             && cache
                 .positions
@@ -348,7 +341,7 @@ impl PairSearch<'_> {
         (i != NO_ANSWER)
             .then_some(i)
             .filter(|&i| self.is_short(&positions[i as usize], c))
-            .filter(|&i| normals[i as usize].dot(n) >= self.config.cos_normal)
+            .filter(|&i| normals[i as usize].dot(n) >= self.config.settings.cos_normal)
     }
 }
 
@@ -375,6 +368,7 @@ fn pull_target(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::settings::RegistrationSettings;
     use tryon_geometry::camera::{DepthImage, Intrinsics};
     use tryon_geometry::spatial::OrganisedCloud;
 
@@ -475,14 +469,18 @@ mod tests {
         }
     }
 
-    const CONFIG: PairingConfig = PairingConfig {
-        association: Association::KdTree,
-        distance: 0.1,
-        cos_normal: 0.5,
-        pull: 0.0,
-        data_step: 1,
-        reuse: 0.0,
-    };
+    fn config() -> PairingConfig {
+        PairingConfig {
+            association: Association::KdTree,
+            distance: 0.1,
+            pull: 0.0,
+            data_step: 1,
+            settings: RegistrationSettings {
+                reuse: 0.0,
+                ..RegistrationSettings::default()
+            },
+        }
+    }
 
     #[test]
     fn pairs_of_both_searches_respect_table_1() {
@@ -490,7 +488,7 @@ mod tests {
         for association in [Association::Projective, Association::KdTree] {
             let config = PairingConfig {
                 association,
-                ..CONFIG
+                ..config()
             };
             let (stats, pairs) = s.pair(&s.positions, &config, &mut PairingScratch::default());
             assert!(
@@ -504,7 +502,9 @@ mod tests {
             for p in &pairs {
                 assert!(s.length(p, &s.positions) < config.distance);
                 let (ours, theirs) = (p.model as usize, p.cell as usize);
-                assert!(s.cloud.normals[theirs].dot(&s.normals[ours]) >= config.cos_normal);
+                assert!(
+                    s.cloud.normals[theirs].dot(&s.normals[ours]) >= config.settings.cos_normal
+                );
             }
         }
     }
@@ -516,7 +516,7 @@ mod tests {
             let config = PairingConfig {
                 association,
                 distance: 0.05,
-                ..CONFIG
+                ..config()
             };
             let (_, pairs) = s.pair(&s.positions, &config, &mut PairingScratch::default());
             let sum: f32 = pairs.iter().map(|p| s.length(p, &s.positions)).sum();
@@ -533,10 +533,8 @@ mod tests {
     fn cached_answers_hold_within_their_bound_until_forgotten() {
         const REUSE: f32 = 2e-3;
         let s = sphere(V3::new(0.01, 0.0, 0.0));
-        let config = PairingConfig {
-            reuse: REUSE,
-            ..CONFIG
-        };
+        let (exact, mut config) = (config(), config());
+        config.settings.reuse = REUSE;
         let mut scratch = PairingScratch::default();
         let (stats, first) = s.pair(&s.positions, &config, &mut scratch);
         assert_eq!(stats.reused, 0, "an empty cache");
@@ -553,7 +551,7 @@ mod tests {
         let near = shifted(0.8 * REUSE);
         let (stats, kept) = s.pair(&near, &config, &mut scratch);
         assert!(stats.reused > stats.visible, "{stats:?}");
-        let (_, shortest) = s.pair(&near, &CONFIG, &mut PairingScratch::default());
+        let (_, shortest) = s.pair(&near, &exact, &mut PairingScratch::default());
         let of_model = |pairs: &[Pair]| {
             let own = pairs.iter().filter(|p| !p.from_data);
             own.map(|p| (p.model, s.length(p, &near)))
@@ -578,7 +576,7 @@ mod tests {
         (s.cells, s.tree) = (vec![], PointTree::new(&[]));
         let config = PairingConfig {
             pull: 0.3,
-            ..CONFIG
+            ..config()
         };
         let mut scratch = PairingScratch::default();
         let (stats, pairs) = s.pair(&s.positions, &config, &mut scratch);

@@ -1,14 +1,11 @@
 //! Connected components of the cells that are neither floor nor background.
 
 use super::refusals::CandidateBox;
+use crate::settings::PersonSettings;
 use nalgebra::Vector3;
 use tryon_geometry::math::{P3, principal_axes};
 use tryon_geometry::spatial::{Label, OrganisedCloud};
 
-/// Depth difference below which neighbouring cells connect, metres; plus [`LINK_SLOPE`] × z.
-const LINK: f32 = 0.08;
-/// Growth of [`LINK`] with the distance.
-const LINK_SLOPE: f32 = 0.015;
 /// Number of cells on a rim of the image above which a component extends beyond it.
 pub(super) const RIM_CELLS: usize = 3;
 /// Largest distance in the image between two parts of one body, cells.
@@ -72,21 +69,32 @@ impl ComponentMap {
     pub(super) const NONE: u32 = u32::MAX;
 
     /// Finds the connected components of [`Label::Other`] cells. `up` is the vertical in the camera frame.
-    pub(super) fn update(&mut self, cloud: &OrganisedCloud, up: &Vector3<f32>) {
+    pub(super) fn update(
+        &mut self,
+        cloud: &OrganisedCloud,
+        up: &Vector3<f32>,
+        settings: &PersonSettings,
+    ) {
         let (columns, rows) = cloud.size();
         self.of_cell.clear();
         self.of_cell.resize(columns * rows, Self::NONE);
         self.list.clear();
         for seed in 0..columns * rows {
             if cloud.labels[seed] == Label::Other && self.of_cell[seed] == Self::NONE {
-                let component = self.flood(cloud, up, seed);
+                let component = self.flood(cloud, up, seed, settings);
                 self.list.push(component);
             }
         }
     }
 
     /// Flood fill from a seed cell.
-    fn flood(&mut self, cloud: &OrganisedCloud, up: &Vector3<f32>, seed: usize) -> Component {
+    fn flood(
+        &mut self,
+        cloud: &OrganisedCloud,
+        up: &Vector3<f32>,
+        seed: usize,
+        settings: &PersonSettings,
+    ) -> Component {
         let (columns, rows) = cloud.size();
         let focal = cloud.focal();
         let right = up.cross(&Vector3::z());
@@ -106,7 +114,7 @@ impl ComponentMap {
             c.side_cells += usize::from(u == 0 || u + 1 == columns);
             c.top_cells += usize::from(v == 0);
             (first_row, last_row) = (first_row.min(v), last_row.max(v));
-            let link = LINK + LINK_SLOPE * z;
+            let link = settings.link + settings.link_slope * z;
             for (du, dv) in [(1, 0), (-1, 0), (0, 1), (0, -1)] {
                 let Some(k) = cloud.cell(u as i32 + du, v as i32 + dv) else {
                     continue;

@@ -1,9 +1,7 @@
 //! Outline of the person: cells at which the body ends, and cells at which an occluder hides it.
 
+use crate::settings::SegmentSettings;
 use tryon_geometry::spatial::{Label, OrganisedCloud};
-
-/// Depth difference from which a neighbour occludes, metres; smaller and folds of cloth count as edges.
-const OCCLUDER: f32 = 0.06;
 
 /// Outline of the person.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -17,7 +15,12 @@ pub struct Contour {
 
 /// Finds both kinds of edges of the person's cells (paper, section 3.2: of edges by self-occlusion only the nearer
 /// side is kept).
-pub fn contour(cloud: &OrganisedCloud, cells: &[u32], out: &mut Contour) {
+pub fn contour(
+    cloud: &OrganisedCloud,
+    cells: &[u32],
+    settings: &SegmentSettings,
+    out: &mut Contour,
+) {
     let columns = cloud.size().0;
     out.true_edges.clear();
     out.false_edges.clear();
@@ -33,14 +36,14 @@ pub fn contour(cloud: &OrganisedCloud, cells: &[u32], out: &mut Contour) {
             };
             match cloud.labels[k] {
                 Label::Person if cloud.depth[k] > 0.0 => {
-                    real |= cloud.depth[k] > z + OCCLUDER;
-                    hidden |= cloud.depth[k] < z - OCCLUDER;
+                    real |= cloud.depth[k] > z + settings.occluder;
+                    hidden |= cloud.depth[k] < z - settings.occluder;
                 }
                 Label::Background => real = true,
                 Label::Floor => {}
                 Label::Other => {
-                    real |= cloud.depth[k] > z + OCCLUDER;
-                    hidden |= cloud.depth[k] < z - OCCLUDER;
+                    real |= cloud.depth[k] > z + settings.occluder;
+                    hidden |= cloud.depth[k] < z - settings.occluder;
                 }
                 // Missing readings at an outline are the shadow of the sensor: no evidence for either.
                 Label::Person | Label::Unknown => {}
@@ -63,11 +66,13 @@ mod tests {
     #[test]
     fn edges_between_arm_and_chest_belong_to_the_arm() {
         let mut cloud = room(0.0, true);
-        let scene = find_planes(&cloud);
+        let settings = SegmentSettings::default();
+        let scene = find_planes(&cloud, &settings.planes);
         let found = find_person(
             &mut cloud,
             &scene,
             PersonChoice::First,
+            &settings,
             &mut SegmentScratch::default(),
         );
         let columns = cloud.size().0;
@@ -79,7 +84,7 @@ mod tests {
             }
         }
         let mut edges = Contour::default();
-        contour(&cloud, &found.cells, &mut edges);
+        contour(&cloud, &found.cells, &settings, &mut edges);
         let row = |c: &u32| *c as usize / columns;
         let inner = |c: &&u32| found.cells.contains(&(**c + 1)) && found.cells.contains(&(**c - 1));
         let inside: Vec<&u32> = edges.true_edges.iter().filter(inner).collect();

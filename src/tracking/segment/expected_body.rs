@@ -1,22 +1,15 @@
 //! The body that is expected in a frame: which component it lies on, and where others begin who stand beside it.
 
 use super::components::{Component, ComponentMap};
+use crate::settings::ExpectedBodySettings;
 use tryon_geometry::spatial::{OrganisedCloud, chessboard_distances};
 
-/// Difference in depth up to which a reading is the expected body's, metres: a sprint between two frames.
-const SAME_BODY: f32 = 0.3;
-/// Area of the person over that of the expected body from which something else may be among it.
-const LARGER: f32 = 1.25;
-/// Distance from the expected body, across the view, within which cells stay the person's then, metres: a fast hand moves
-/// by 0.1 between two frames.
-const AROUND: f32 = 0.15;
-
-/// Area of an expected body below which nothing is split, m²: a head alone.
-const LEAST_AREA: f32 = 0.08;
-
-/// Depth of the body in each cell, infinity beside it, metres, shape `[cells]`; empty when nothing is expected.
+/// The expected body; its depth in each cell, infinity beside it, metres, shape `[cells]`, is empty when nothing is expected.
 #[derive(Clone, Copy)]
-pub(super) struct ExpectedBody<'a>(pub(super) &'a [f32]);
+pub(super) struct ExpectedBody<'a> {
+    pub(super) depth: &'a [f32],
+    pub(super) settings: &'a ExpectedBodySettings,
+}
 
 /// Area of a cell at depth `z` that faces the camera, m².
 fn cell_area(cloud: &OrganisedCloud, z: f32) -> f32 {
@@ -33,9 +26,9 @@ impl ExpectedBody<'_> {
         least: f32,
     ) -> Option<&'m Component> {
         let mut areas = vec![0.0f32; map.list.len()];
-        for (i, z) in self.0.iter().enumerate() {
+        for (i, z) in self.depth.iter().enumerate() {
             let id = map.of_cell[i];
-            if id != ComponentMap::NONE && (cloud.depth[i] - z).abs() < SAME_BODY {
+            if id != ComponentMap::NONE && (cloud.depth[i] - z).abs() < self.settings.same_body {
                 areas[id as usize] += cell_area(cloud, cloud.depth[i]);
             }
         }
@@ -53,31 +46,32 @@ impl ExpectedBody<'_> {
         members: &[bool],
         to_body: &mut Vec<u16>,
     ) -> Option<u16> {
-        let drawn = self.0.iter().filter(|z| z.is_finite());
+        let settings = self.settings;
+        let drawn = self.depth.iter().filter(|z| z.is_finite());
         let (expected, depth, cells) = drawn.fold((0.0, 0.0, 0.0f32), |(area, depth, n), z| {
             (area + cell_area(cloud, *z), depth + z, n + 1.0)
         });
         let own = map.list.iter().filter(|c| members[c.id as usize]);
         let area: f32 = own.map(|c| c.area).sum();
-        if expected < LEAST_AREA || area < LARGER * expected {
+        if expected < settings.least_area || area < settings.larger * expected {
             return None;
         }
-        chessboard_distances(cloud, |k| self.0[k].is_finite(), |_| u16::MAX, to_body);
+        chessboard_distances(cloud, |k| self.depth[k].is_finite(), |_| u16::MAX, to_body);
         let focal = cloud.focal()[0].max(cloud.focal()[1]);
-        Some((AROUND * focal * cells / depth).round() as u16)
+        Some((settings.around * focal * cells / depth).round() as u16)
     }
 }
 
-/// Takes components out of the members of which less than half lies within the limit of the body.
+/// Takes components out of the members of which less than half of the cells are near the body.
 pub(super) fn drop_others(
     map: &ComponentMap,
     main: &Component,
-    (to_body, limit): (&[u16], u16),
+    near_body: impl Fn(usize) -> bool,
     members: &mut [bool],
 ) {
     let mut near = vec![0usize; map.list.len()];
-    for (id, distance) in map.of_cell.iter().zip(to_body) {
-        if *id != ComponentMap::NONE && *distance <= limit {
+    for (cell, id) in map.of_cell.iter().enumerate() {
+        if *id != ComponentMap::NONE && near_body(cell) {
             near[*id as usize] += 1;
         }
     }
@@ -90,6 +84,7 @@ pub(super) fn drop_others(
 mod tests {
     use crate::segment::fixture::cloud_of;
     use crate::segment::{PersonChoice, PersonPrior, ScenePlanes, SegmentScratch, find_person};
+    use crate::settings::SegmentSettings;
     use tryon_geometry::math::P3;
     use tryon_geometry::spatial::OrganisedCloud;
 
@@ -112,7 +107,13 @@ mod tests {
         };
         let scene = ScenePlanes::default();
         let choice = PersonChoice::Near(prior);
-        let found = find_person(cloud, &scene, choice, &mut SegmentScratch::default());
+        let found = find_person(
+            cloud,
+            &scene,
+            choice,
+            &SegmentSettings::default(),
+            &mut SegmentScratch::default(),
+        );
         let columns = found.cells.iter().map(|c| *c as usize % cloud.size().0);
         Some((columns.clone().min()?, columns.max()?))
     }

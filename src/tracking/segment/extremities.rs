@@ -1,6 +1,7 @@
 //! Ends of the body: cells that are farthest from the torso along the surface (Plagemann et al. 2010, accumulative
 //! geodesic extrema).
 
+use crate::settings::ExtremitySettings;
 use std::cmp::{Ordering, Reverse};
 use std::collections::BinaryHeap;
 use tryon_geometry::math::P3;
@@ -34,12 +35,6 @@ impl Extremity {
 
 /// Rows and columns to the farthest neighbour of a cell: fingers and sleeves leave gaps of one cell.
 const NEIGHBOURS: i32 = 2;
-/// Distance from which neighbours lie on different limbs, metres; plus [`JUMP_SLOPE`] × z.
-const JUMP: f32 = 0.06;
-/// Growth of [`JUMP`] with the depth, as cells grow.
-const JUMP_SLOPE: f32 = 0.015;
-/// Least geodesic distance of an end from the torso and from earlier paths, metres; shorter ones are folds and noise.
-const SHORTEST: f32 = 0.2;
 
 /// Distance and number of a cell on the front of the search, nearest first.
 #[derive(PartialEq)]
@@ -90,7 +85,7 @@ impl<'a> Geodesics<'a> {
         }
     }
     /// Propagates distances from the sources (Dijkstra).
-    fn propagate(&mut self) {
+    fn propagate(&mut self, settings: &ExtremitySettings) {
         let columns = self.cloud.size().0;
         while let Some(Reverse(Front(d, c))) = self.front.pop() {
             if d > self.distance[c as usize] {
@@ -98,7 +93,7 @@ impl<'a> Geodesics<'a> {
             }
             let (u, v) = ((c as usize % columns) as i32, (c as usize / columns) as i32);
             let p = self.cloud.points[c as usize];
-            let reach = JUMP + JUMP_SLOPE * p.z;
+            let reach = settings.jump + settings.jump_slope * p.z;
             for dv in -NEIGHBOURS..=NEIGHBOURS {
                 for du in -NEIGHBOURS..=NEIGHBOURS {
                     let Some(k) = self.cloud.cell(u + du, v + dv) else {
@@ -135,13 +130,13 @@ impl<'a> Geodesics<'a> {
     }
 }
 
-/// Up to `most` ends of the body whose refined cells are `cells`, the farthest first, measured from the cell nearest to
+/// Ends of the body whose refined cells are `cells`, the farthest first, measured from the cell nearest to
 /// `torso` (camera frame, metres). Cells that are not connected to the torso have no end.
 pub fn extremities(
     cloud: &OrganisedCloud,
     cells: &[u32],
     torso: &P3,
-    most: usize,
+    settings: &ExtremitySettings,
 ) -> Vec<Extremity> {
     let usable = || {
         cells
@@ -156,13 +151,13 @@ pub fn extremities(
     let mut geodesics = Geodesics::new(cloud, usable());
     geodesics.add_source(source);
     let mut out: Vec<Extremity> = Vec::new();
-    while out.len() < most {
-        geodesics.propagate();
+    while out.len() < settings.most {
+        geodesics.propagate(settings);
         let Some(end) = geodesics.farthest(cells) else {
             break;
         };
         let length = geodesics.distance[end as usize];
-        if length < SHORTEST {
+        if length < settings.shortest {
             break;
         }
         out.push(Extremity {
@@ -212,7 +207,7 @@ mod tests {
     #[test]
     fn ends_are_sorted_by_geodesic_distance() {
         let (cloud, cells) = figure();
-        let ends = extremities(&cloud, &cells, &P3::new(0.0, 0.0, 2.0), 8);
+        let ends = extremities(&cloud, &cells, &P3::new(0.0, 0.0, 2.0), &most(8));
         assert!(ends.len() >= 3, "{}", ends.len());
         assert!(
             ends.windows(2).all(|w| w[0].length >= w[1].length),
@@ -260,16 +255,23 @@ mod tests {
     #[test]
     fn degenerate_bodies_have_no_ends() {
         let (mut cloud, cells) = figure();
-        assert!(extremities(&cloud, &[], &P3::origin(), 4).is_empty());
-        assert!(extremities(&cloud, &cells, &P3::origin(), 0).is_empty());
+        assert!(extremities(&cloud, &[], &P3::origin(), &most(4)).is_empty());
+        assert!(extremities(&cloud, &cells, &P3::origin(), &most(0)).is_empty());
         assert!(
-            extremities(&cloud, &cells[..1], &P3::origin(), 4).is_empty(),
+            extremities(&cloud, &cells[..1], &P3::origin(), &most(4)).is_empty(),
             "a single cell"
         );
         cloud.depth.fill(0.0);
         assert!(
-            extremities(&cloud, &cells, &P3::origin(), 4).is_empty(),
+            extremities(&cloud, &cells, &P3::origin(), &most(4)).is_empty(),
             "no reading"
         );
+    }
+
+    fn most(most: usize) -> ExtremitySettings {
+        ExtremitySettings {
+            most,
+            ..ExtremitySettings::default()
+        }
     }
 }

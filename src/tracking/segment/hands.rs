@@ -1,29 +1,10 @@
 //! Hands beyond sleeves that give no return: small components at the end of a hole that begins on the body.
 
 use super::components::{Component, ComponentMap, RIM_CELLS};
+use crate::settings::HandSettings;
 use nalgebra::Vector3;
 use tryon_geometry::math::P3;
 use tryon_geometry::spatial::OrganisedCloud;
-
-/// Least cells of a hand, fingers taken together.
-const LEAST_CELLS: usize = 2;
-/// Largest area of a hand, m²; with the wrist it has 0.02.
-const MOST_AREA: f32 = 0.03;
-/// Largest distance of a hand from the visible body, metres: a long arm from the edge of the chest.
-const ARM_LENGTH: f32 = 0.80;
-/// Least cells between hand and body.
-const LEAST_GAP: i32 = 3;
-/// Least share of the cells between hand and body without a reading.
-const HOLE_SHARE: f32 = 0.7;
-/// Most candidates examined; bounds the time in a cluttered room.
-const MOST_CANDIDATES: usize = 6;
-/// Every n-th cell of the body is tested as the start of a hole.
-const BODY_STEP: usize = 8;
-/// Largest share of single missing cells on the body. A picture with nine tenths of its pixels lost has 0.18, a whole
-/// one next to none; above this, holes mean nothing.
-const MOST_PORES: f32 = 0.03;
-/// Largest distance between parts of one hand, metres.
-const HAND_LENGTH: f32 = 0.15;
 
 /// Components of the body.
 pub(super) struct BodyComponents<'a> {
@@ -34,6 +15,7 @@ pub(super) struct BodyComponents<'a> {
     pub(super) main: &'a Component,
     /// Cells without a reading are empty space, not holes.
     pub(super) background_removed: bool,
+    pub(super) settings: &'a HandSettings,
 }
 
 /// Small components near each other, as one candidate.
@@ -58,7 +40,7 @@ pub(super) fn find_hands(cloud: &OrganisedCloud, body: &BodyComponents<'_>) -> V
     }
     let cells: Vec<usize> = (0..cloud.depth.len())
         .filter(|i| is_trunk(body, *i))
-        .step_by(BODY_STEP)
+        .step_by(body.settings.body_step)
         .collect();
     if is_porous(cloud, body, cells.len()) {
         return Vec::new();
@@ -68,11 +50,11 @@ pub(super) fn find_hands(cloud: &OrganisedCloud, body: &BodyComponents<'_>) -> V
         .filter_map(|c| {
             let centre = P3::from(c.centre());
             let end = cloud.cell_of(&centre)?;
-            let near = |k: &&usize| (cloud.centre(**k) - centre).norm() <= ARM_LENGTH;
+            let near = |k: &&usize| (cloud.centre(**k) - centre).norm() <= body.settings.arm_length;
             cells
                 .iter()
                 .filter(near)
-                .any(|k| is_joined_by_hole(cloud, body, c, [end, cell_position(cloud, *k)]))
+                .any(|k| is_joined_by_hole(cloud, body, c, end, cell_position(cloud, *k)))
                 .then_some(centre)
         })
         .collect()
@@ -89,14 +71,15 @@ fn candidates(body: &BodyComponents<'_>) -> Vec<Candidate> {
         // Without a background the surroundings of the body are a hole: there a hand must be separate.
         c.id != body.main.id
             && !(body.background_removed && body.members[c.id as usize])
-            && c.area < MOST_AREA
-            && (c.centre.z - body.main.centre.z).abs() < ARM_LENGTH
+            && c.area < body.settings.most_area
+            && (c.centre.z - body.main.centre.z).abs() < body.settings.arm_length
             && c.side_cells <= RIM_CELLS
             && c.top_cells <= RIM_CELLS
     };
     let mut out: Vec<Candidate> = Vec::new();
     for c in body.map.list.iter().filter(small) {
-        let near = |g: &&mut Candidate| (g.centre() - c.centre.coords).norm() < HAND_LENGTH;
+        let near =
+            |g: &&mut Candidate| (g.centre() - c.centre.coords).norm() < body.settings.hand_length;
         let sum = c.centre.coords * c.cells as f32;
         match out.iter_mut().find(near) {
             Some(g) => {
@@ -111,8 +94,8 @@ fn candidates(body: &BodyComponents<'_>) -> Vec<Candidate> {
             }),
         }
     }
-    out.retain(|g| g.cells >= LEAST_CELLS);
-    out.truncate(MOST_CANDIDATES);
+    out.retain(|g| g.cells >= body.settings.least_cells);
+    out.truncate(body.settings.most_candidates);
     out
 }
 
@@ -120,7 +103,7 @@ fn candidates(body: &BodyComponents<'_>) -> Vec<Candidate> {
 fn is_trunk(body: &BodyComponents<'_>, cell: usize) -> bool {
     body.map
         .member(cell, body.members)
-        .is_some_and(|c| c.area >= MOST_AREA)
+        .is_some_and(|c| c.area >= body.settings.most_area)
 }
 
 /// True if single missing readings are all over the body (`sampled` of its cells, every n-th).
@@ -134,7 +117,7 @@ fn is_porous(cloud: &OrganisedCloud, body: &BodyComponents<'_>, sampled: usize) 
     };
     let pore = |i: &usize| cloud.depth[*i] <= 0.0 && (between(*i, 1) || between(*i, columns));
     let pores = (0..cloud.depth.len()).filter(pore).count();
-    pores as f32 > MOST_PORES * (BODY_STEP * sampled) as f32
+    pores as f32 > body.settings.most_pores * (body.settings.body_step * sampled) as f32
 }
 
 /// True if the straight line of cells from the candidate to the body runs through missing readings.
@@ -142,9 +125,11 @@ fn is_joined_by_hole(
     cloud: &OrganisedCloud,
     body: &BodyComponents<'_>,
     candidate: &Candidate,
-    [(u, v), (to_u, to_v)]: [(i32, i32); 2],
+    from: (i32, i32),
+    to: (i32, i32),
 ) -> bool {
-    let (du, dv) = (to_u - u, to_v - v);
+    let (u, v) = from;
+    let (du, dv) = (to.0 - u, to.1 - v);
     let steps = du.abs().max(dv.abs());
     let (mut empty, mut between) = (0, 0);
     for s in 1..steps {
@@ -157,5 +142,5 @@ fn is_joined_by_hole(
         between += 1;
         empty += i32::from(cloud.depth[at] <= 0.0);
     }
-    between >= LEAST_GAP && empty as f32 >= HOLE_SHARE * between as f32
+    between >= body.settings.least_gap && empty as f32 >= body.settings.hole_share * between as f32
 }

@@ -5,44 +5,11 @@ use super::components::{Component, ComponentMap, RIM_CELLS};
 use super::expected_body::{ExpectedBody, drop_others};
 use super::hands::{BodyComponents, find_hands};
 use super::plane_bands::PlaneBands;
-use super::refusals::{CandidateBox, Refusals};
+use super::refusals::{CandidateBox, Refusal, Refusals};
+use crate::settings::{PersonSettings, SegmentSettings};
 use nalgebra::Vector3;
 use tryon_geometry::math::P3;
 use tryon_geometry::spatial::{Label, OrganisedCloud};
-
-/// Smallest visible area of a body, m²: head and shoulders seen from the front.
-const LEAST_AREA: f32 = 0.08;
-/// Share of [`LEAST_AREA`] that identifies the person near the prior: half hidden suffices, a hand alone does not.
-const PRIOR_SHARE: f32 = 0.3;
-/// Largest visible area of a body, m²; a big man in a T-pose shows 0.9.
-const MOST_AREA: f32 = 1.6;
-/// Least visible height of a body, and the tallest body with raised arms, metres.
-const HEIGHT: [f32; 2] = [0.35, 2.6];
-/// Widest body, arms spread, metres.
-const MOST_WIDTH: f32 = 2.2;
-/// Largest depth of a cut-off part from the median of the body, metres.
-const LIMB_REACH: f32 = 0.9;
-/// Largest area of a further part, as a share of the main one.
-const LARGE_PART: f32 = 1.0;
-/// Share of its rows on a side of the image above which a candidate is furniture or a wall.
-const SIDE_SHARE: f32 = 0.5;
-
-/// Least height of a person cut by the side of the image, with the head in the picture, metres.
-const CUT_HEIGHT: f32 = 1.0;
-/// Largest depth of such a person, metres; a wall or a table seen along its length is deeper.
-const CUT_DEPTH: f32 = 0.9;
-/// Least standard deviation of such a person from a plane, metres: half a standing person has 0.05, the noise of a
-/// sensor at 3 m is 0.01. Doors and wardrobes are flatter.
-const ROUND: f64 = 0.025;
-
-/// Rank penalty of a component on a side of the image, metres of distance.
-const SIDE_COST: f32 = 4.0;
-/// Rank penalty at the upper rim, metres of distance; a person close by may reach it.
-const TOP_COST: f32 = 2.0;
-/// Height below which a component is more likely a box or a chair, metres.
-const UPRIGHT: f32 = 0.8;
-/// Rank penalty of such a component, metres of distance.
-const LOW_COST: f32 = 1.5;
 
 /// Selection among the components of the size of a body.
 #[derive(Clone, Copy, Debug)]
@@ -104,10 +71,11 @@ pub fn find_person(
     cloud: &mut OrganisedCloud,
     scene: &ScenePlanes,
     choice: PersonChoice<'_>,
+    settings: &SegmentSettings,
     scratch: &mut SegmentScratch,
 ) -> PersonSearch {
     let mut out = PersonSearch::default();
-    scratch.bands.update(scene, cloud);
+    scratch.bands.update(scene, cloud, &settings.planes);
     out.candidates = classify(cloud, &scratch.bands);
     let background_removed = label_removed_background(cloud, scene);
     if out.candidates == 0 {
@@ -117,27 +85,31 @@ pub fn find_person(
         .floor
         .map_or_else(|| Vector3::new(0.0, -1.0, 0.0), |f| f.normal)
         .cast::<f32>();
-    scratch.components.update(cloud, &up);
+    scratch.components.update(cloud, &up, &settings.person);
     let map = &scratch.components;
     out.components = map.list.len();
-    let expected = ExpectedBody(match choice {
-        PersonChoice::Near(prior) => prior.body,
-        _ => &[],
-    });
+    let expected = ExpectedBody {
+        depth: match choice {
+            PersonChoice::Near(prior) => prior.body,
+            _ => &[],
+        },
+        settings: &settings.expected_body,
+    };
+    let sizes = &settings.person;
     let main = match choice {
         PersonChoice::Near(prior) => {
-            let covering = expected.covering(cloud, map, PRIOR_SHARE * LEAST_AREA);
-            covering.or_else(|| nearest(&map.list, prior))
+            let covering = expected.covering(cloud, map, sizes.prior_share * sizes.least_area);
+            covering.or_else(|| nearest(&map.list, prior, sizes))
         }
         PersonChoice::First => {
-            let ranked = ranked(cloud, map);
+            let ranked = ranked(cloud, map, sizes);
             out.rivals = ranked.len();
             ranked.first().copied()
         }
         PersonChoice::Untried { refusals, recent } => {
-            let ranked = ranked(cloud, map);
+            let ranked = ranked(cloud, map, sizes);
             out.rivals = ranked.len();
-            untried(&ranked, refusals, recent)
+            untried(&ranked, recent, |c| refusals.of(c, &settings.refusals))
         }
     };
     let Some(main) = main else {
@@ -145,11 +117,11 @@ pub fn find_person(
     };
     out.candidate = Some(main.candidate());
 
-    let mut members = with_limbs(cloud, map, main);
+    let mut members = with_limbs(cloud, map, main, sizes);
     let to_body = &mut scratch.to_body;
     let limit = expected.split_limit(cloud, map, &members, to_body);
     if let Some(limit) = limit {
-        drop_others(map, main, (to_body, limit), &mut members);
+        drop_others(map, main, |cell| to_body[cell] <= limit, &mut members);
     }
     for i in 0..cloud.depth.len() {
         let is_near = limit.is_none_or(|limit| to_body[i] <= limit);
@@ -163,6 +135,7 @@ pub fn find_person(
         members: &members,
         main,
         background_removed,
+        settings: &settings.hands,
     };
     out.hands = find_hands(cloud, &body);
     let (columns, rows) = cloud.size();
@@ -213,21 +186,29 @@ fn label_removed_background(cloud: &mut OrganisedCloud, scene: &ScenePlanes) -> 
 }
 
 /// The largest component near the predicted place.
-fn nearest<'a>(components: &'a [Component], prior: PersonPrior<'_>) -> Option<&'a Component> {
+fn nearest<'a>(
+    components: &'a [Component],
+    prior: PersonPrior<'_>,
+    settings: &PersonSettings,
+) -> Option<&'a Component> {
     let off = |c: &Component| (c.centre - prior.centre).norm();
     components
         .iter()
-        .filter(|c| c.area > PRIOR_SHARE * LEAST_AREA && c.area < MOST_AREA && off(c) < prior.reach)
+        .filter(|c| {
+            c.area > settings.prior_share * settings.least_area
+                && c.area < settings.most_area
+                && off(c) < prior.reach
+        })
         .max_by(|a, b| a.area.total_cmp(&b.area).then(b.id.cmp(&a.id)))
 }
 
 /// The first of the least often refused components, of those that need not wait.
-fn untried<'a>(
+fn untried<'a, 'r>(
     ranked: &[&'a Component],
-    refusals: &Refusals,
     recent: Option<PersonPrior<'_>>,
+    refusal: impl Fn(&CandidateBox) -> Option<&'r Refusal>,
 ) -> Option<&'a Component> {
-    let count = |c: &Component| match refusals.of(&c.candidate()) {
+    let count = |c: &Component| match refusal(&c.candidate()) {
         Some(refusal) => (refusal.wait == 0).then_some(refusal.count),
         None => Some(0),
     };
@@ -240,28 +221,32 @@ fn untried<'a>(
 }
 
 /// All components of the size of a body, the most likely first; those that a side of the image cuts last.
-fn ranked<'a>(cloud: &OrganisedCloud, map: &'a ComponentMap) -> Vec<&'a Component> {
+fn ranked<'a>(
+    cloud: &OrganisedCloud,
+    map: &'a ComponentMap,
+    settings: &PersonSettings,
+) -> Vec<&'a Component> {
     let sized = |c: &&Component| {
         let size = c.hi - c.lo;
-        (LEAST_AREA..MOST_AREA).contains(&c.area)
-            && (HEIGHT[0]..HEIGHT[1]).contains(&size.y)
-            && size.x < MOST_WIDTH
-            && (c.side_cells as f32) < SIDE_SHARE * c.rows as f32
+        (settings.least_area..settings.most_area).contains(&c.area)
+            && (settings.heights[0]..settings.heights[1]).contains(&size.y)
+            && size.x < settings.most_width
+            && (c.side_cells as f32) < settings.side_share * c.rows as f32
     };
     // A component on a side or at the top is more likely a wall, a door or a shelf.
     let cost = |c: &Component| {
         let penalty = |applies: bool, cost: f32| if applies { cost } else { 0.0 };
         c.centre.z
-            + penalty(c.side_cells > RIM_CELLS, SIDE_COST)
-            + penalty(c.top_cells > RIM_CELLS, TOP_COST)
-            + penalty(c.hi.y - c.lo.y < UPRIGHT, LOW_COST)
+            + penalty(c.side_cells > RIM_CELLS, settings.side_cost)
+            + penalty(c.top_cells > RIM_CELLS, settings.top_cost)
+            + penalty(c.hi.y - c.lo.y < settings.upright, settings.low_cost)
     };
     let by = |key: &dyn Fn(&Component) -> f32, list: &mut Vec<&Component>| {
         list.sort_by(|a, b| key(a).total_cmp(&key(b)).then(a.id.cmp(&b.id)));
     };
     let mut whole: Vec<&Component> = map.list.iter().filter(sized).collect();
     by(&cost, &mut whole);
-    let is_cut = |c: &&Component| !sized(c) && is_cut(c, cloud, map);
+    let is_cut = |c: &&Component| !sized(c) && is_cut(c, cloud, map, settings);
     let mut cut: Vec<&Component> = map.list.iter().filter(is_cut).collect();
     by(&|c| c.centre.z, &mut cut);
     whole.extend(cut);
@@ -269,7 +254,12 @@ fn ranked<'a>(cloud: &OrganisedCloud, map: &'a ComponentMap) -> Vec<&'a Componen
 }
 
 /// The main component and the parts that its own limbs cut off: near it in the image and in depth. Shape `[components]`.
-fn with_limbs(cloud: &OrganisedCloud, map: &ComponentMap, main: &Component) -> Vec<bool> {
+fn with_limbs(
+    cloud: &OrganisedCloud,
+    map: &ComponentMap,
+    main: &Component,
+    settings: &PersonSettings,
+) -> Vec<bool> {
     let mut members = vec![false; map.list.len()];
     members[main.id as usize] = true;
     let mut area = main.area;
@@ -280,12 +270,13 @@ fn with_limbs(cloud: &OrganisedCloud, map: &ComponentMap, main: &Component) -> V
                 continue;
             }
             let c = &map.list[*id as usize];
-            let limb = (c.centre.z - main.centre.z).abs() < LIMB_REACH
-                && c.lo.z > main.lo.z - LIMB_REACH
-                && c.hi.z < main.hi.z + LIMB_REACH
-                && area + c.area < MOST_AREA
-                && (c.area <= LARGE_PART * main.area || is_above_or_below(c, main))
-                && (c.side_cells as f32) < SIDE_SHARE * c.rows as f32;
+            let limb = (c.centre.z - main.centre.z).abs() < settings.limb_reach
+                && c.lo.z > main.lo.z - settings.limb_reach
+                && c.hi.z < main.hi.z + settings.limb_reach
+                && area + c.area < settings.most_area
+                && (c.area <= settings.large_part * main.area
+                    || is_above_or_below(c, main, settings))
+                && (c.side_cells as f32) < settings.side_share * c.rows as f32;
             if limb && map.is_near(cloud, &members, i) {
                 members[*id as usize] = true;
                 area += c.area;
@@ -296,21 +287,28 @@ fn with_limbs(cloud: &OrganisedCloud, map: &ComponentMap, main: &Component) -> V
 }
 
 /// True for a component on a side of the image over most of its rows that has the shape of a person.
-fn is_cut(c: &Component, cloud: &OrganisedCloud, map: &ComponentMap) -> bool {
+fn is_cut(
+    c: &Component,
+    cloud: &OrganisedCloud,
+    map: &ComponentMap,
+    settings: &PersonSettings,
+) -> bool {
     let size = c.hi - c.lo;
-    (LEAST_AREA..MOST_AREA).contains(&c.area)
-        && (CUT_HEIGHT..HEIGHT[1]).contains(&size.y)
-        && size.x < MOST_WIDTH
-        && size.z < CUT_DEPTH
+    (settings.least_area..settings.most_area).contains(&c.area)
+        && (settings.cut_height..settings.heights[1]).contains(&size.y)
+        && size.x < settings.most_width
+        && size.z < settings.cut_depth
         && c.top_cells <= RIM_CELLS
-        && map.thickness(c, cloud).is_some_and(|t| t > ROUND)
+        && map
+            .thickness(c, cloud)
+            .is_some_and(|t| t > settings.roundness)
 }
 
 /// True for a part in the same column of the image: an arm across the body cuts it into an upper and a lower part, and
 /// either may be the larger.
-fn is_above_or_below(c: &Component, main: &Component) -> bool {
+fn is_above_or_below(c: &Component, main: &Component, settings: &PersonSettings) -> bool {
     let overlap = c.hi.x.min(main.hi.x) - c.lo.x.max(main.lo.x);
-    overlap > 0.5 * (c.hi.x - c.lo.x) && c.hi.x - c.lo.x < MOST_WIDTH * 0.5
+    overlap > 0.5 * (c.hi.x - c.lo.x) && c.hi.x - c.lo.x < settings.most_width * 0.5
 }
 
 #[cfg(test)]
@@ -322,11 +320,12 @@ mod tests {
     #[test]
     fn a_box_in_a_room_is_segmented_with_and_without_a_prior() {
         let mut cloud = room(0.1, true);
-        let scene = find_planes(&cloud);
+        let scene = find_planes(&cloud, &Default::default());
         let found = find_person(
             &mut cloud,
             &scene,
             PersonChoice::First,
+            &Default::default(),
             &mut SegmentScratch::default(),
         );
         // 0.4 × 1.7 m at 2.5 m with a focal length of 131 cells, less 20 mm of floor.
@@ -347,6 +346,7 @@ mod tests {
             &mut cloud,
             &scene,
             PersonChoice::Near(prior),
+            &Default::default(),
             &mut SegmentScratch::default(),
         );
         assert_eq!(again.cells, found.cells);
@@ -377,6 +377,7 @@ mod tests {
             &mut at_the_rim(true),
             &ScenePlanes::default(),
             PersonChoice::First,
+            &SegmentSettings::default(),
             &mut scratch,
         );
         assert!(found.cells.len() > 500, "{} cells", found.cells.len());
@@ -384,6 +385,7 @@ mod tests {
             &mut at_the_rim(false),
             &ScenePlanes::default(),
             PersonChoice::First,
+            &SegmentSettings::default(),
             &mut scratch,
         );
         assert!(
@@ -415,11 +417,12 @@ mod tests {
     fn a_hand_at_the_end_of_a_hole_is_found() {
         for hole in [true, false] {
             let mut cloud = sleeve(hole);
-            let scene = find_planes(&cloud);
+            let scene = find_planes(&cloud, &Default::default());
             let found = find_person(
                 &mut cloud,
                 &scene,
                 PersonChoice::First,
+                &Default::default(),
                 &mut SegmentScratch::default(),
             );
             assert!(
@@ -436,12 +439,18 @@ mod tests {
     #[test]
     fn an_empty_room_and_an_empty_image_hold_nobody() {
         let mut cloud = room(0.0, false);
-        let scene = find_planes(&cloud);
+        let scene = find_planes(&cloud, &Default::default());
         let mut scratch = SegmentScratch::default();
         assert!(
-            find_person(&mut cloud, &scene, PersonChoice::First, &mut scratch)
-                .cells
-                .is_empty()
+            find_person(
+                &mut cloud,
+                &scene,
+                PersonChoice::First,
+                &Default::default(),
+                &mut scratch
+            )
+            .cells
+            .is_empty()
         );
         cloud.depth.fill(0.0);
         assert!(
@@ -449,6 +458,7 @@ mod tests {
                 &mut cloud,
                 &ScenePlanes::default(),
                 PersonChoice::First,
+                &Default::default(),
                 &mut scratch
             )
             .cells

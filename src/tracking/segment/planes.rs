@@ -1,13 +1,10 @@
 //! Planes of the scene: the floor and the background, their tolerances, and the upright frame of the floor.
 
+use crate::settings::PlaneSettings;
 use nalgebra::{Rotation3, UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
 use tryon_geometry::math::{Camera, P3, Rigid, World};
 
-/// Distance from the floor that still counts as floor, metres (paper, section 6: 20 mm).
-pub(super) const FLOOR_TOLERANCE: f32 = 0.020;
-/// Distance from a background plane that still counts as background, metres (paper, section 6: 200 mm).
-pub(super) const BACKGROUND_TOLERANCE: f32 = 0.200;
 /// Axial noise of the sensor: this × z² (metres), from Nguyen et al. 2012 (Kinect v1), twice the standard deviation.
 pub(super) const NOISE_PER_SQUARE_METRE: f32 = 0.004;
 
@@ -26,16 +23,16 @@ impl ScenePlane {
         self.normal.cast::<f32>().dot(&p.coords) + self.offset as f32
     }
     /// Distance at which a measured point may lie off the plane, metres: floor tolerance and depth noise.
-    pub(super) fn tolerance(&self, p: &P3) -> f32 {
+    pub(super) fn tolerance(&self, p: &P3, settings: &PlaneSettings) -> f32 {
         // Depth noise acts along the ray; only its part along the normal leaves the plane.
         let along = (self.normal.cast::<f32>().dot(&p.coords)
             / p.coords.norm().max(f32::MIN_POSITIVE))
         .abs();
-        FLOOR_TOLERANCE + NOISE_PER_SQUARE_METRE * p.z * p.z * along
+        settings.floor_tolerance + NOISE_PER_SQUARE_METRE * p.z * p.z * along
     }
     /// True if the point belongs to the plane.
-    pub(super) fn contains(&self, p: &P3) -> bool {
-        self.distance(p).abs() < self.tolerance(p)
+    pub(super) fn contains(&self, p: &P3, settings: &PlaneSettings) -> bool {
+        self.distance(p).abs() < self.tolerance(p, settings)
     }
 }
 

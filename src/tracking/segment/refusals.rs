@@ -1,6 +1,7 @@
 //! Memory of candidates that turned out to be nobody: each waits longer before it is tried again, unless it changes, and
 //! what spoke against it still does.
 
+use crate::settings::RefusalSettings;
 use serde::{Deserialize, Serialize};
 use tryon_geometry::math::{P3, V3};
 
@@ -32,39 +33,29 @@ pub struct Refusal {
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Refusals(Vec<Refusal>);
 
-/// Displacement of a centre below which a candidate is the same thing, metres. Larger mistakes a person in motion for
-/// what was refused; smaller forgets things whose outline flickers.
-const SAME_CENTRE: f32 = 0.08;
-/// The same for the corners of the box, where single cells flicker, metres. The lower side says nothing: thin poles and
-/// shins come and go near the floor.
-const SAME_CORNER: f32 = 0.25;
-/// See [`SAME_CORNER`].
+/// Axes of the lower corner that are compared: its side says nothing, thin poles and shins come and go near the floor.
 const ABOVE: V3 = V3::new(1.0, 0.0, 1.0);
-/// Refusals without a wait: a second start may succeed where noise spoilt the first.
-const FREE_TRIALS: u32 = 2;
-/// Longest wait, frames: 2 s.
-const LONGEST: u32 = 64;
-/// Most refusals kept; the oldest is forgotten.
-const MOST: usize = 32;
 
 impl CandidateBox {
     /// True for the same thing seen again.
-    fn is_same(&self, other: &Self) -> bool {
-        (self.centre - other.centre).norm() < SAME_CENTRE
-            && (self.lo - other.lo).component_mul(&ABOVE).amax() < SAME_CORNER
-            && (self.hi - other.hi).amax() < SAME_CORNER
+    fn is_same(&self, other: &Self, settings: &RefusalSettings) -> bool {
+        (self.centre - other.centre).norm() < settings.same_centre
+            && (self.lo - other.lo).component_mul(&ABOVE).amax() < settings.same_corner
+            && (self.hi - other.hi).amax() < settings.same_corner
     }
 }
 
 impl Refusals {
     /// The refusal of a candidate.
-    pub fn of(&self, candidate: &CandidateBox) -> Option<&Refusal> {
-        self.0.iter().find(|r| r.candidate.is_same(candidate))
+    pub fn of(&self, candidate: &CandidateBox, settings: &RefusalSettings) -> Option<&Refusal> {
+        self.0
+            .iter()
+            .find(|r| r.candidate.is_same(candidate, settings))
     }
 
     /// Log odds for a person of a candidate after its refusals; 0 without any.
-    pub fn log_odds(&self, candidate: &CandidateBox) -> f32 {
-        self.of(candidate).map_or(0.0, |r| r.log_odds)
+    pub fn log_odds(&self, candidate: &CandidateBox, settings: &RefusalSettings) -> f32 {
+        self.of(candidate, settings).map_or(0.0, |r| r.log_odds)
     }
 
     /// Counts a frame of waiting.
@@ -75,17 +66,17 @@ impl Refusals {
     }
 
     /// Records a refusal; the wait doubles with each one of the same candidate.
-    pub fn record(&mut self, candidate: CandidateBox, log_odds: f32) {
-        let count = self.forget(&candidate).saturating_add(1);
+    pub fn record(&mut self, candidate: CandidateBox, log_odds: f32, settings: &RefusalSettings) {
+        let count = self.forget(&candidate, settings).saturating_add(1);
         let doubled = 1u32
-            .checked_shl(count.saturating_sub(FREE_TRIALS))
-            .unwrap_or(LONGEST);
-        let wait = if count > FREE_TRIALS {
-            doubled.min(LONGEST)
+            .checked_shl(count.saturating_sub(settings.free_trials))
+            .unwrap_or(settings.longest);
+        let wait = if count > settings.free_trials {
+            doubled.min(settings.longest)
         } else {
             0
         };
-        if self.0.len() >= MOST {
+        if self.0.len() >= settings.most {
             self.0.remove(0);
         }
         self.0.push(Refusal {
@@ -97,8 +88,11 @@ impl Refusals {
     }
 
     /// Forgets the refusal of a candidate; returns how often it was refused.
-    pub fn forget(&mut self, candidate: &CandidateBox) -> u32 {
-        let place = self.0.iter().position(|r| r.candidate.is_same(candidate));
+    pub fn forget(&mut self, candidate: &CandidateBox, settings: &RefusalSettings) -> u32 {
+        let place = self
+            .0
+            .iter()
+            .position(|r| r.candidate.is_same(candidate, settings));
         place.map_or(0, |i| self.0.remove(i).count)
     }
 }
@@ -117,39 +111,46 @@ mod tests {
 
     #[test]
     fn waits_of_a_thing_grow_and_a_changed_one_waits_for_nothing() {
-        let mut refusals = Refusals::default();
+        let (mut refusals, settings) = (Refusals::default(), RefusalSettings::default());
         let mut waits = vec![];
         for _ in 0..10 {
-            refusals.record(candidate(0.0, 1.7), -1.0);
-            waits.extend(refusals.of(&candidate(0.01, 1.7)).map(|r| r.wait));
+            refusals.record(candidate(0.0, 1.7), -1.0, &settings);
+            waits.extend(
+                refusals
+                    .of(&candidate(0.01, 1.7), &settings)
+                    .map(|r| r.wait),
+            );
         }
         assert_eq!(waits, [0, 0, 2, 4, 8, 16, 32, 64, 64, 64]);
         refusals.age();
         assert_eq!(
-            refusals.of(&candidate(0.0, 1.7)).map(|r| r.wait),
-            Some(LONGEST - 1)
+            refusals.of(&candidate(0.0, 1.7), &settings).map(|r| r.wait),
+            Some(settings.longest - 1)
         );
         let mut footless = candidate(0.0, 1.7);
         footless.lo.y += 0.5;
-        assert!(refusals.of(&footless).is_some());
+        assert!(refusals.of(&footless, &settings).is_some());
         for other in [candidate(0.1, 1.7), candidate(0.0, 2.1)] {
-            assert!(refusals.of(&other).is_none(), "moved, or an arm raised");
+            assert!(
+                refusals.of(&other, &settings).is_none(),
+                "moved, or an arm raised"
+            );
         }
-        assert_eq!(refusals.forget(&candidate(0.0, 1.7)), 10);
-        assert!(refusals.of(&candidate(0.0, 1.7)).is_none());
+        assert_eq!(refusals.forget(&candidate(0.0, 1.7), &settings), 10);
+        assert!(refusals.of(&candidate(0.0, 1.7), &settings).is_none());
     }
 
     #[test]
     fn no_more_than_the_latest_refusals_are_kept() {
-        let mut refusals = Refusals::default();
-        for k in 0..2 * MOST {
-            refusals.record(candidate(k as f32, 1.7), -1.0);
+        let (mut refusals, settings) = (Refusals::default(), RefusalSettings::default());
+        for k in 0..2 * settings.most {
+            refusals.record(candidate(k as f32, 1.7), -1.0, &settings);
         }
-        assert_eq!(refusals.0.len(), MOST);
-        assert!(refusals.of(&candidate(0.0, 1.7)).is_none());
+        assert_eq!(refusals.0.len(), settings.most);
+        assert!(refusals.of(&candidate(0.0, 1.7), &settings).is_none());
         assert!(
             refusals
-                .of(&candidate(2.0 * MOST as f32 - 1.0, 1.7))
+                .of(&candidate(2.0 * settings.most as f32 - 1.0, 1.7), &settings)
                 .is_some()
         );
     }

@@ -1,31 +1,13 @@
 //! Calibration: size, shape and pose in turns (Algorithm 1).
 
 use super::size::SizeEstimate;
-use crate::fit::{
-    ANNEAL, FitContext, FitReport, FitScratch, START, Schedule, TRACK, evaluate, fit_pose,
-};
+use crate::fit::{FitContext, FitReport, FitScratch, evaluate, fit_pose};
 use crate::model::{PersonalBody, TrackerModel};
 use crate::registration::Observation;
+use crate::settings::Schedule;
 use nalgebra::{Translation3, Vector3};
 use tryon_body::{BodyShape, Pose};
 use tryon_geometry::math::{Camera, Rigid};
-
-/// Most rounds of pose and size in the first frame.
-const ROUNDS: usize = 8;
-/// Rounds and fit of a trial at another height: shifted from a fitted pose, eight iterations rank it as twenty do.
-const TRIAL_ROUNDS: usize = 2;
-/// See [`TRIAL_ROUNDS`].
-const TRIAL: Schedule = Schedule {
-    iterations: 8,
-    ..START
-};
-/// Change of a coefficient, or of ten times a scale, below which size has settled.
-const SETTLED: f64 = 0.05;
-/// Residual of a first fit above which other heights are tried, metres. Along an upright body the surface hardly changes,
-/// so that a fit 10 cm too high settles there (6.6 mm against 2.1; sensor noise lies between).
-const WELL_FITTED: f64 = 4e-3;
-/// Displacement of the trials along the upright, metres.
-const SHIFT: f64 = 0.15;
 
 /// Size, shape and pose of one start.
 #[derive(Clone)]
@@ -84,30 +66,35 @@ impl SizeCalibration<'_> {
         size.observe(&context, pose, shape, self.scratch, true);
         self.body.update(self.model, shape);
         if size.frames > frames {
-            size.check_settled(&self.model.template, &self.body.rest);
+            size.check_settled(self.model, &self.body.rest);
         }
         fit
     }
 
     /// Settles from `start`, and from higher and lower where that fits badly.
     fn settle_first(&mut self, start: SizedPose, schedule: &Schedule) -> SettledStart {
+        let settings = &self.model.config.shape;
         let cut_below = self.cut_below;
-        let best = self.settle(start.clone(), schedule, ROUNDS, cut_below);
-        if best.fit.residual <= WELL_FITTED {
+        let best = self.settle(start.clone(), schedule, settings.rounds, cut_below);
+        if best.fit.residual <= settings.well_fitted {
             return best;
         }
-        let trials = [-SHIFT, SHIFT].map(|shift| {
+        let trial = Schedule {
+            iterations: settings.trial_iterations,
+            ..self.model.config.fit.start
+        };
+        let trials = [-settings.shift, settings.shift].map(|shift| {
             let mut other = start.clone();
             let shift = Translation3::from(self.up * shift);
             other.pose.root = Rigid::new(shift * other.pose.root.iso());
-            self.settle(other, &TRIAL, TRIAL_ROUNDS, cut_below)
+            self.settle(other, &trial, settings.trial_rounds, cut_below)
         });
         let better = trials
             .into_iter()
             .filter(|t| t.cost < best.cost)
             .min_by(|a, b| a.cost.total_cmp(&b.cost));
         match better {
-            Some(trial) => self.settle(trial.sized, schedule, ROUNDS, false),
+            Some(trial) => self.settle(trial.sized, schedule, settings.rounds, false),
             None => best,
         }
     }
@@ -121,9 +108,14 @@ impl SizeCalibration<'_> {
         rounds: usize,
         cut: bool,
     ) -> SettledStart {
+        let config = &self.model.config;
         self.body.update(self.model, &sized.shape);
         let near = Schedule {
-            ahead: if cut { schedule.ahead } else { ANNEAL },
+            ahead: if cut {
+                schedule.ahead
+            } else {
+                config.fit.anneal
+            },
             ..*schedule
         };
         let mut fit = self.fit(&mut sized.pose, schedule);
@@ -137,7 +129,7 @@ impl SizeCalibration<'_> {
             let change = size.observe(&context, pose, shape, self.scratch, false);
             self.body.sketch(self.model, shape);
             fit = self.fit(&mut sized.pose, &near);
-            if change < SETTLED {
+            if change < config.shape.settled {
                 break;
             }
         }
@@ -147,7 +139,13 @@ impl SizeCalibration<'_> {
             body: self.body,
             observation: self.observation,
         };
-        let cost = evaluate(&context, &sized.pose, TRACK.distance[0], self.scratch).cost;
+        let cost = evaluate(
+            &context,
+            &sized.pose,
+            config.fit.track.distance[0],
+            self.scratch,
+        )
+        .cost;
         SettledStart { sized, fit, cost }
     }
 

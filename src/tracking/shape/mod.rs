@@ -8,10 +8,8 @@ pub(crate) mod surface;
 
 pub(crate) use calibration::SizeCalibration;
 pub use known_body::{KnownBody, ShapeFault};
-#[cfg(test)]
-pub(crate) use probation::PROBATION;
 pub(crate) use probation::Probation;
 pub use size::SizeEstimate;
-pub(crate) use size::{ADULTS, first_shapes};
+pub(crate) use size::first_shapes;
 pub use surface::SurfaceStatistics;
 pub(crate) use surface::{SurfaceScratch, fit_displacements};

@@ -1,12 +1,7 @@
 //! Comparison of a body that was measured before with the person who is found, by what fits leave over.
 
+use crate::settings::ShapeSettings;
 use serde::{Deserialize, Serialize};
-
-/// Frames over which residuals are compared: one alone may be of a pose in motion.
-pub(crate) const PROBATION: u32 = 8;
-/// Largest ratio of the least residual of [`PROBATION`] frames to the earlier one, and what is added to it, metres: fits of
-/// one person stay within a third, a girth 6 cm off doubles them.
-const RESIDUALS: (f64, f64) = (1.5, 5e-4);
 
 /// Comparison of a known body with the person who was found.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -29,10 +24,10 @@ impl Probation {
     }
 
     /// Adds the residual of a frame; once all are in, true for another person.
-    pub(crate) fn compare(&mut self, residual: f64) -> Option<bool> {
+    pub(crate) fn compare(&mut self, residual: f64, settings: &ShapeSettings) -> Option<bool> {
         self.least = self.least.min(residual);
         self.frames += 1;
-        let (ratio, added) = RESIDUALS;
-        (self.frames >= PROBATION).then_some(self.least > ratio * self.before + added)
+        let most = settings.residual_ratio * self.before + settings.residual_allowance;
+        (self.frames >= settings.probation_frames).then_some(self.least > most)
     }
 }

@@ -9,7 +9,7 @@ use crate::model::TrackerModel;
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3, Vector6};
 use serde::{Deserialize, Serialize};
 use tryon_body::measure::measure;
-use tryon_body::{BodyShape, Pose, RestBody, Template};
+use tryon_body::{BodyShape, Pose, RestBody};
 
 /// Accumulated information on size and shape.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -25,42 +25,15 @@ pub struct SizeEstimate {
     /// Girths of chest, natural waist and hip when they were last compared, metres.
     #[serde(default)]
     girths: Option<[f64; 3]>,
-    /// They changed less than [`SETTLED_GIRTH`] over [`SETTLING_FRAMES`].
+    /// They changed less than `settled_girth` over `settling_frames`.
     #[serde(default)]
     pub(crate) is_settled: bool,
 }
 
-/// Prior of a coefficient (one standard deviation = 1), per point, m²: larger keeps the mean shape against readings.
-const SHAPE_PRIOR: f64 = 5e-7;
-/// Standard deviation of a bone's scale: with a shape space, which explains most of it, and without one.
-const SCALE_DEVIATIONS: [f64; 2] = [0.05, 0.15];
-/// Weight λₛ of eq. 23, per point, m²: bones tied by symmetry differ by a tenth of what single ones do.
-const TIE: f64 = 5e-3;
 /// Largest coefficient, standard deviations: a child is eight below the mean of adults.
 pub(crate) const MOST_DEVIATIONS: f64 = 8.0;
-/// Statures of adults, metres.
-pub(crate) const ADULTS: std::ops::Range<f64> = 1.3..2.2;
-/// Statures of children, metres, which are also heights of adults who crouch or sit.
-const CHILDREN: std::ops::Range<f64> = 0.9..ADULTS.start;
 /// Bounds of a bone's scale.
 pub(crate) const SCALES: [f64; 2] = [0.5, 1.4];
-/// Longest pair and kernel width in the first frames, metres: feet of a wrong stature start 10 cm away.
-const START: (f32, f64) = (0.15, 0.08);
-/// The same after [`SEARCHING`] frames.
-const LATER: (f32, f64) = (0.08, 0.04);
-/// Frames with the longer pairs.
-const SEARCHING: u32 = 20;
-/// Point-to-point weight: two fifths of the pose's, as sizes must slide along limbs.
-const POINT_TO_POINT: f64 = 0.02;
-/// Frames between two comparisons of the girths: half a second at 30 Hz.
-const SETTLING_FRAMES: u32 = 15;
-/// Change of a girth over [`SETTLING_FRAMES`] below which the size has settled, metres: a quarter of a step of the size
-/// table. A first estimate is off by up to 4 cm and settles within 30 to 45 frames.
-const SETTLED_GIRTH: f64 = 0.01;
-/// Factor on earlier information per frame: its pairs belonged to a body not yet adapted.
-const FADE: f64 = 0.95;
-/// Change of a coefficient that weighs as much as a change of a scale, for convergence.
-const SCALE_CHANGE: f64 = 10.0;
 /// Regularisation of the eliminated pose, per point: far below any observed angle, keeps unobserved ones from absorbing
 /// all information.
 const POSE_RIDGE: f64 = 1e-7;
@@ -85,15 +58,16 @@ impl SizeEstimate {
         scratch: &mut FitScratch,
         keep: bool,
     ) -> f64 {
+        let settings = &context.model.config.shape.size;
         let model = context.model;
         let n = model.directions.len();
         if n == 0 {
             return 0.0;
         }
-        let (reach, sigma) = if keep && self.frames >= SEARCHING {
-            LATER
+        let (reach, sigma) = if keep && self.frames >= settings.searching {
+            (settings.later_reach, settings.later_sigma)
         } else {
-            START
+            (settings.first_reach, settings.first_sigma)
         };
         pair(context, pose, reach, 0.0, scratch);
         let Some((information, gradient)) = frame_information(context, pose, sigma, scratch) else {
@@ -104,10 +78,10 @@ impl SizeEstimate {
         let mut total = information;
         let mut sum = evidence;
         if self.information.len() == n * n {
-            total += DMatrix::from_column_slice(n, n, &self.information) * FADE;
-            sum += DVector::from_column_slice(&self.evidence) * FADE;
+            total += DMatrix::from_column_slice(n, n, &self.information) * settings.fade;
+            sum += DVector::from_column_slice(&self.evidence) * settings.fade;
         }
-        let frames = 1.0 + FADE * self.weight;
+        let frames = 1.0 + settings.fade * self.weight;
         let Some(next) = solve(model, &total / frames, &sum / frames) else {
             return 0.0;
         };
@@ -121,22 +95,23 @@ impl SizeEstimate {
         (0..n)
             .map(|d| {
                 let is_scale = model.directions[d].bone.is_some();
-                (next[d] - now[d]).abs() * if is_scale { SCALE_CHANGE } else { 1.0 }
+                (next[d] - now[d]).abs() * if is_scale { settings.scale_change } else { 1.0 }
             })
             .fold(0.0, f64::max)
     }
 
     /// Compares the girths of the `rest` body with those of half a second before; to be called after each new frame.
-    pub(crate) fn check_settled(&mut self, template: &Template, rest: &RestBody) {
-        if !self.frames.is_multiple_of(SETTLING_FRAMES) {
+    pub(crate) fn check_settled(&mut self, model: &TrackerModel, rest: &RestBody) {
+        let settings = &model.config.shape.size;
+        if !self.frames.is_multiple_of(settings.settling_frames) {
             return;
         }
-        let girths = measure(template, rest).map(|m| [m.chest, m.natural_waist, m.hip]);
+        let girths = measure(&model.template, rest).map(|m| [m.chest, m.natural_waist, m.hip]);
         let before = std::mem::replace(&mut self.girths, girths.ok());
         let pairs = before.zip(self.girths);
         self.is_settled |= pairs.is_some_and(|(before, now)| {
             let changes = before.iter().zip(now).map(|(a, b)| (a - b).abs());
-            changes.fold(0.0, f64::max) < SETTLED_GIRTH
+            changes.fold(0.0, f64::max) < settings.settled_girth
         });
     }
 }
@@ -171,17 +146,18 @@ fn store(model: &TrackerModel, x: &DVector<f64>, shape: &mut BodyShape) {
 
 /// Data and prior: (Λ + P) x = η, with eq. 23 in P.
 fn solve(model: &TrackerModel, mut h: DMatrix<f64>, g: DVector<f64>) -> Option<DVector<f64>> {
+    let settings = &model.config.shape.size;
     let has_space = model.directions.iter().any(|d| d.bone.is_none());
-    let deviation = SCALE_DEVIATIONS[usize::from(!has_space)];
+    let deviation = settings.scale_deviations[usize::from(!has_space)];
     for (d, direction) in model.directions.iter().enumerate() {
         h[(d, d)] += if direction.bone.is_some() {
-            SHAPE_PRIOR / (deviation * deviation)
+            settings.prior / (deviation * deviation)
         } else {
-            SHAPE_PRIOR
+            settings.prior
         };
     }
     for &(a, b, weight) in &model.tied {
-        let w = TIE * weight;
+        let w = settings.tie * weight;
         h[(a, a)] += w;
         h[(b, b)] += w;
         h[(a, b)] -= w;
@@ -246,10 +222,11 @@ struct PairedSample {
 
 /// Samples of the current pairs in the order of their first residual.
 fn paired_samples(context: &FitContext<'_>, scratch: &FitScratch, sigma: f64) -> Vec<PairedSample> {
+    let settings = &context.model.config.shape.size;
     let centre = scratch.centre();
     let mut index = vec![usize::MAX; context.model.samples.len()];
     let mut out: Vec<PairedSample> = Vec::new();
-    for_each_point(context, scratch, sigma, POINT_TO_POINT, |term| {
+    for_each_point(context, scratch, sigma, settings.point_to_point, |term| {
         let at = &mut index[term.sample];
         if *at == usize::MAX {
             *at = out.len();
@@ -323,7 +300,8 @@ fn frame_information(
     sigma: f64,
     scratch: &mut FitScratch,
 ) -> Option<(DMatrix<f64>, DVector<f64>)> {
-    assemble(context, pose, sigma, POINT_TO_POINT, scratch);
+    let settings = &context.model.config.shape.size;
+    assemble(context, pose, sigma, settings.point_to_point, scratch);
     let motion = SizeMotion::new(context.model, pose, scratch);
     let samples = paired_samples(context, scratch, sigma);
     let size = SizeEquations::new(&motion, &samples);
@@ -358,9 +336,11 @@ pub(crate) fn first_shapes(
     known: &BodyShape,
 ) -> Vec<BodyShape> {
     let sized = |s: f64| from_stature(model, s);
+    let settings = &model.config.shape.size;
+    let [least, most] = settings.adults;
     match stature {
-        Some(s) if ADULTS.contains(&s) => vec![sized(s)],
-        Some(s) if CHILDREN.contains(&s) => vec![known.clone(), sized(s)],
+        Some(s) if (least..most).contains(&s) => vec![sized(s)],
+        Some(s) if (settings.least_child..least).contains(&s) => vec![known.clone(), sized(s)],
         _ => vec![known.clone()],
     }
 }
@@ -408,26 +388,27 @@ mod tests {
 
     #[test]
     fn the_size_settles_once_girths_stay_for_half_a_second() {
-        let template = TestScene::new(50, 480).model.template;
+        let model = TestScene::new(50, 480).model;
+        let frames = model.config.shape.size.settling_frames;
         let body = |weight: f64| {
-            template.personalise(&BodyShape {
+            model.template.personalise(&BodyShape {
                 coefficients: vec![0.0, weight],
                 ..BodyShape::default()
             })
         };
         let mut size = SizeEstimate::default();
         let mut settled = Vec::new();
-        for frame in 1..=4 * SETTLING_FRAMES {
+        for frame in 1..=4 * frames {
             size.frames = frame;
             // Girths move until the thirtieth frame.
-            size.check_settled(&template, &body(f64::from(frame.min(30)) * 0.05));
+            size.check_settled(&model, &body(f64::from(frame.min(30)) * 0.05));
             if size.is_settled {
                 settled.push(frame);
             }
         }
-        assert_eq!(settled.first(), Some(&(3 * SETTLING_FRAMES)));
+        assert_eq!(settled.first(), Some(&(3 * frames)));
         // It never becomes unsettled again.
-        assert_eq!(settled.len() as u32, SETTLING_FRAMES + 1);
+        assert_eq!(settled.len() as u32, frames + 1);
     }
 
     #[test]

@@ -1,9 +1,11 @@
 //! Surface displacements along the rest normals (section 3.3, eq. 13 to 17), by warm-started conjugate gradients.
 
 use crate::fit::{FitContext, FitScratch};
+use crate::model::{PersonalBody, TrackerModel};
 use crate::registration::IndexImage;
+use crate::settings::SurfaceSettings;
 use serde::{Deserialize, Serialize};
-use tryon_body::{BoneTransforms, RestBody, Template, skin};
+use tryon_body::{BoneTransforms, skin};
 use tryon_geometry::math::{P3, V3};
 use tryon_geometry::mesh::Csr;
 use tryon_geometry::par::Par;
@@ -34,28 +36,6 @@ pub(crate) struct SurfaceScratch {
     laplacian: Vec<V3>,
 }
 
-/// Weights of eq. 17 and the frame from which the temporal term acts (paper, section 3.3).
-const LAPLACIAN: f32 = 4.0;
-const TEMPORAL: f32 = 6.0;
-const SPATIAL: f32 = 2.0;
-const TEMPORAL_FROM: u32 = 20;
-/// Pull to zero where there was never a reading: displacements explain only the remainder of shape.
-const RIDGE: f32 = 0.05;
-/// Longest displacement towards a reading, metres (paper, section 3.3).
-const DISTANCE: f32 = 0.05;
-/// Deviation at which the temporal term weighs as much as a reading, metres; the paper leaves its unit open.
-const UNIT_DEVIATION: f32 = 0.005;
-/// Least deviation of a displacement, metres: the accuracy of averaged depth.
-const LEAST_DEVIATION: f32 = 0.002;
-/// Conjugate gradient iterations per update; the next one starts from their result.
-const ITERATIONS: usize = 5;
-/// Depth behind the drawn body from which a vertex is occluded, metres.
-const HIDDEN: f32 = 0.04;
-/// Cosine between normal and viewing ray below which a reading is too grazing to measure a displacement.
-const GRAZING: f32 = 0.35;
-
-/// Cosine between the normals of vertex and reading below which they belong to different surfaces (Table 1: 60°).
-const COS_NORMAL: f32 = 0.5;
 /// Diagonal of LᵀL of a regular mesh: 1 + 1/degree, for the preconditioner.
 const LAPLACIAN_DIAGONAL: f32 = 1.17;
 
@@ -74,8 +54,7 @@ pub(crate) fn fit_displacements(
     statistics.spread.resize(n, 0.0);
     let readings = measure(context, &paired.bones, &paired.pairing.image, s);
     s.before.clone_from(displacements);
-    let (template, rest) = (&context.model.template, &context.body.rest);
-    solve(template, rest, displacements, statistics, s);
+    solve(context.model, context.body, displacements, statistics, s);
     let change: f32 = displacements
         .iter()
         .zip(&s.before)
@@ -106,6 +85,7 @@ fn measure(
     image: &IndexImage,
     s: &mut SurfaceScratch,
 ) -> usize {
+    let settings = &context.model.config.shape.surface;
     let (rest, observation) = (&context.body.rest, context.observation);
     let (weights, grid) = (context.model.template.weights(), observation.grid);
     let n = rest.base.len();
@@ -123,23 +103,23 @@ fn measure(
     for i in 0..n {
         let p = s.posed[i];
         let normal = rotations[weights.dominant(i)] * rest.normals[i];
-        if normal.dot(&p.coords) > -GRAZING * p.coords.norm() {
+        if normal.dot(&p.coords) > -settings.grazing * p.coords.norm() {
             continue;
         }
         let Some(cell) = grid.cell_of(&p).and_then(|(u, v)| grid.cell(u, v)) else {
             continue;
         };
         let usable = grid.labels[cell] == Label::Person && !observation.false_edges[cell];
-        if !usable || p.z > image.depth[cell] + HIDDEN {
+        if !usable || p.z > image.depth[cell] + settings.hidden {
             continue;
         }
         let facet = grid.normals[cell];
         let slope = facet.dot(&normal);
-        if slope < COS_NORMAL {
+        if slope < settings.cos_normal {
             continue;
         }
         let d = facet.dot(&(grid.points[cell] - p)) / slope;
-        if d.abs() < DISTANCE {
+        if d.abs() < settings.distance {
             s.target[i] = d;
             s.weight[i] = 1.0;
             readings += 1;
@@ -155,31 +135,34 @@ fn dot(a: &[f32], b: &[f32]) -> f64 {
 
 /// Conjugate gradients with a Jacobi preconditioner from the current displacements `d`.
 fn solve(
-    template: &Template,
-    rest: &RestBody,
+    model: &TrackerModel,
+    body: &PersonalBody,
     d: &mut [f32],
     statistics: &SurfaceStatistics,
     s: &mut SurfaceScratch,
 ) {
     let n = d.len();
+    let settings = &model.config.shape.surface;
+    let (template, rest) = (&model.template, &body.rest);
     let neighbours = template.topology().vertex_neighbours();
     let temporal = |i: usize| {
-        if statistics.count < TEMPORAL_FROM {
+        if statistics.count < settings.temporal_from {
             return 0.0;
         }
-        let variance =
-            statistics.spread[i] / statistics.count as f32 + LEAST_DEVIATION * LEAST_DEVIATION;
-        TEMPORAL * UNIT_DEVIATION * UNIT_DEVIATION / variance
+        let variance = statistics.spread[i] / statistics.count as f32
+            + settings.least_deviation * settings.least_deviation;
+        settings.temporal * settings.unit_deviation * settings.unit_deviation / variance
     };
     s.diagonal.clear();
     for i in 0..n {
-        s.diagonal.push(s.weight[i] + temporal(i) + RIDGE);
+        s.diagonal.push(s.weight[i] + temporal(i) + settings.ridge);
     }
     // b = ω t + temporal μ; r = b − A d.
     let system = SurfaceSystem {
         neighbours,
         normals: &rest.normals,
         diagonal: &s.diagonal,
+        settings,
     };
     system.multiply(d, &mut s.laplacian, &mut s.image);
     s.residual.clear();
@@ -190,8 +173,8 @@ fn solve(
     let jacobi: Vec<f32> = (0..n)
         .map(|i| {
             1.0 / (s.diagonal[i]
-                + SPATIAL * neighbours.row(i).len() as f32
-                + LAPLACIAN * LAPLACIAN_DIAGONAL)
+                + settings.spatial * neighbours.row(i).len() as f32
+                + settings.laplacian * LAPLACIAN_DIAGONAL)
         })
         .collect();
     s.preconditioned.clear();
@@ -199,7 +182,7 @@ fn solve(
         .extend(s.residual.iter().zip(&jacobi).map(|(r, m)| r * m));
     s.direction.clone_from(&s.preconditioned);
     let mut rz = dot(&s.residual, &s.preconditioned);
-    for _ in 0..ITERATIONS {
+    for _ in 0..settings.iterations {
         system.multiply(&s.direction, &mut s.laplacian, &mut s.image);
         let curvature = dot(&s.direction, &s.image);
         if curvature <= 0.0 || rz <= 0.0 {
@@ -220,18 +203,20 @@ fn solve(
     }
 }
 
-/// System matrix of eq. 17: diagonal + SPATIAL · graph Laplacian + LAPLACIAN · LᵀL.
+/// System matrix of eq. 17: diagonal + spatial weight · graph Laplacian + Laplacian weight · LᵀL.
 ///
 /// (L x)ᵢ = nᵢ xᵢ − mean of the neighbours' nⱼ xⱼ (eq. 14 with the mean for the sum, so that flat parts cost nothing).
 struct SurfaceSystem<'a> {
     neighbours: &'a Csr,
     normals: &'a [V3],
     diagonal: &'a [f32],
+    settings: &'a SurfaceSettings,
 }
 
 impl SurfaceSystem<'_> {
     /// Writes the product with `x` into `out`; `laplacian` receives L x.
     fn multiply(&self, x: &[f32], laplacian: &mut Vec<V3>, out: &mut Vec<f32>) {
+        let settings = self.settings;
         let (neighbours, normals, diagonal) = (self.neighbours, self.normals, self.diagonal);
         let n = x.len();
         laplacian.clear();
@@ -246,7 +231,7 @@ impl SurfaceSystem<'_> {
             }
             let degree = row.len().max(1) as f32;
             laplacian.push(normals[i] * x[i] - sum / degree);
-            out.push(diagonal[i] * x[i] + SPATIAL * difference);
+            out.push(diagonal[i] * x[i] + settings.spatial * difference);
         }
         for i in 0..n {
             let mut sum = laplacian[i];
@@ -254,7 +239,7 @@ impl SurfaceSystem<'_> {
                 let j = j as usize;
                 sum -= laplacian[j] / neighbours.row(j).len().max(1) as f32;
             }
-            out[i] += LAPLACIAN * normals[i].dot(&sum);
+            out[i] += settings.laplacian * normals[i].dot(&sum);
         }
     }
 }
@@ -273,10 +258,12 @@ mod tests {
         let mut rng = rand_pcg::Pcg32::seed_from_u64(5);
         let mut random = || -> Vec<f32> { (0..n).map(|_| rng.random_range(-1.0..1.0)).collect() };
         let (x, y) = (random(), random());
+        let settings = SurfaceSettings::default();
         let system = SurfaceSystem {
             neighbours: template.topology().vertex_neighbours(),
             normals: &rest.normals,
-            diagonal: &vec![RIDGE; n],
+            diagonal: &vec![settings.ridge; n],
+            settings: &settings,
         };
         let product = |x: &[f32]| {
             let mut out = Vec::new();
@@ -289,7 +276,7 @@ mod tests {
             dot(&x, &product(&x)),
         );
         assert!((xay - yax).abs() < 1e-5 * xax, "{xay} against {yax}");
-        assert!(xax > f64::from(RIDGE) * dot(&x, &x), "{xax}");
+        assert!(xax > f64::from(settings.ridge) * dot(&x, &x), "{xax}");
         assert!(product(&vec![0.0; n]).iter().all(|v| *v == 0.0));
     }
 }

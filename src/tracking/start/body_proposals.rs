@@ -7,32 +7,12 @@ use crate::fit::{FitContext, FitScratch, evaluate};
 use crate::model::{PartKind, TrackerModel};
 use crate::registration::Observation;
 use crate::segment::part_forest::{PartScratch, PersonCells};
+use crate::settings::ProposalSettings;
 use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
 use std::f64::consts::PI;
 use tryon_body::parts::{BodyPart, BodySide};
 use tryon_body::{BoneTransforms, Pose};
 use tryon_geometry::math::P3;
-
-/// Longest pair in comparisons of poses that are not fitted yet, metres.
-const REACH: f32 = 0.15;
-/// Confidence above which the facing isn't doubted; 1 to 3 of 100 are wrong beyond it.
-const SURE: f32 = 0.95;
-/// Confidence below which the facing may be anything.
-const DOUBTFUL: f32 = 0.6;
-/// Confidence of a proposed hand or foot that can contradict a pose, and the distance beyond which it does, metres: a third
-/// of the proposed hands are wrong, and right ones lie within 10 cm.
-const HEAVY: f32 = 0.35;
-/// See [`HEAVY`].
-const FAR: f64 = 0.25;
-/// Factor on the cost that a limb elsewhere undercuts.
-const CHEAPER: f64 = 0.98;
-/// Turn from a pose of a moment ago beyond which another must be clearly better, radians: nobody turns around between two
-/// frames, while front and back may cost the same.
-const TURN: f64 = 1.75;
-/// Factor on the cost of such a pose.
-const TURN_COST: f64 = 1.5;
-/// Factor on the cost of a pose that faces away from a certain facing, less 1.
-const AGAINST_FACING: f64 = 0.5;
 
 /// Proposals of one frame.
 pub(crate) struct BodyProposals {
@@ -41,6 +21,7 @@ pub(crate) struct BodyProposals {
     facing: Option<Facing>,
     /// Unit direction against gravity, camera frame.
     up: Vector3<f64>,
+    settings: ProposalSettings,
 }
 
 /// The subject's cells, as the part forest reads them; `up` is the unit vector against gravity, camera frame.
@@ -65,12 +46,14 @@ impl BodyProposals {
     ) -> Self {
         let person = person_cells(observation, up);
         let found = model.forest.propose(&person, scratch);
-        let joints = JointProposals::new(&model.part_classes, &found);
+        let joints =
+            JointProposals::new(&model.part_classes, &found, &model.config.start.proposals);
         Self {
             flipped: joints.flipped(&model.part_classes),
             joints,
             facing: facing(&person, &scratch.yaw),
             up: *up,
+            settings: model.config.start.proposals,
         }
     }
 
@@ -78,13 +61,14 @@ impl BodyProposals {
     /// quarter turn from the one and after a turn around from the other.
     pub(crate) fn prior_cost(&self, pose: &Pose, recent: Option<UnitQuaternion<f64>>) -> f64 {
         let rotation = pose.root.iso().rotation;
-        let has_turned = recent.is_some_and(|r| r.angle_to(&rotation) > TURN);
-        let turn_cost = if has_turned { TURN_COST } else { 1.0 };
+        let settings = &self.settings;
+        let has_turned = recent.is_some_and(|r| r.angle_to(&rotation) > settings.turn);
+        let turn_cost = if has_turned { settings.turn_cost } else { 1.0 };
         let confidence = match self.facing {
             Some(f) if !self.is_doubtful() && self.faces_away(pose) => f64::from(f.confidence),
             _ => 0.0,
         };
-        turn_cost * (1.0 + AGAINST_FACING * confidence)
+        turn_cost * (1.0 + settings.against_facing * confidence)
     }
 
     /// True for a pose more than a quarter turn from the facing.
@@ -96,15 +80,16 @@ impl BodyProposals {
 
     /// True where a hand or foot of `bones` is far from all its heavy proposals.
     pub(crate) fn contradict(&self, model: &TrackerModel, bones: &BoneTransforms) -> bool {
+        let settings = &model.config.start.proposals;
         let ends = [PartKind::Hand, PartKind::Foot].into_iter();
         let mut classes =
             ends.flat_map(|k| [BodySide::Left, BodySide::Right].map(|side| k.class(side)));
         classes.any(|class| {
-            let is_heavy = self.joints.of_class(class).any(|(_, w)| w > HEAVY);
+            let is_heavy = self.joints.of_class(class).any(|(_, w)| w > settings.heavy);
             let Some(end) = model.part_classes.anchor_of(class, &bones.joints) else {
                 return false;
             };
-            let is_far = |(p, _): (P3, f32)| (p.cast::<f64>() - end).norm() > FAR;
+            let is_far = |(p, _): (P3, f32)| (p.cast::<f64>() - end).norm() > settings.far;
             is_heavy && self.joints.of_class(class).all(is_far)
         })
     }
@@ -126,13 +111,16 @@ impl BodyProposals {
 
     /// True where the facing may be anything: half a body, a profile.
     pub(crate) fn is_doubtful(&self) -> bool {
-        self.facing.is_none_or(|f| f.confidence < DOUBTFUL)
+        self.facing
+            .is_none_or(|f| f.confidence < self.settings.doubtful)
     }
 
     /// Joints as seen, and exchanged where the facing isn't sure, each with the turn of an upright trunk from the facing,
     /// radians.
     fn hypotheses(&self) -> impl Iterator<Item = (&JointProposals, f64)> {
-        let is_sure = self.facing.is_some_and(|f| f.confidence > SURE);
+        let is_sure = self
+            .facing
+            .is_some_and(|f| f.confidence > self.settings.sure);
         let flipped = (!is_sure).then_some((&self.flipped, PI));
         std::iter::once((&self.joints, 0.0)).chain(flipped)
     }
@@ -175,14 +163,15 @@ fn with_limbs(
     pose: &Pose,
     scratch: &mut FitScratch,
 ) -> Option<Pose> {
+    let settings = &context.model.config.start.proposals;
     use BodyPart::*;
-    let mut least = evaluate(context, pose, REACH, scratch).cost;
+    let mut least = evaluate(context, pose, settings.reach, scratch).cost;
     let mut best = None;
     for part in [LeftLeg, RightLeg, LeftArm, RightArm] {
         let others = proposed(context, joints).limb_poses(best.as_ref().unwrap_or(pose), part);
-        least *= CHEAPER;
+        least *= settings.cheaper;
         for other in others {
-            let cost = evaluate(context, &other, REACH, scratch).cost;
+            let cost = evaluate(context, &other, settings.reach, scratch).cost;
             if cost < least {
                 (least, best) = (cost, Some(other));
             }

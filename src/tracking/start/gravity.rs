@@ -10,8 +10,6 @@ use crate::segment::part_forest::PartScratch;
 use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
 use tryon_geometry::math::{Camera, Rigid, World};
 
-/// Height of a camera whose floor is unknown, metres: the usual mount of a kiosk.
-pub(crate) const ASSUMED_HEIGHT: f64 = 1.2;
 /// Directions against gravity, camera frame: upright, on either side, upside down.
 const UPS: [[f64; 3]; 4] = [
     [0.0, -1.0, 0.0],
@@ -19,9 +17,6 @@ const UPS: [[f64; 3]; 4] = [
     [-1.0, 0.0, 0.0],
     [0.0, 1.0, 0.0],
 ];
-/// Certainty of another roll over that of an upright camera from which it is taken: people who bend down or lie are as
-/// certain in one as in the other.
-const SURER: f32 = 1.15;
 
 /// Pose of a level camera at the assumed height above the floor, at the roll in which the subject's cells are surest.
 pub(crate) fn rolled_camera(
@@ -29,6 +24,7 @@ pub(crate) fn rolled_camera(
     observation: &Observation<'_>,
     scratch: &mut PartScratch,
 ) -> Rigid<World, Camera> {
+    let settings = &model.config.start;
     let mut certainty = |up: &Vector3<f64>| {
         let person = person_cells(observation, up);
         let map = model.forest.classify(&person, scratch);
@@ -36,11 +32,11 @@ pub(crate) fn rolled_camera(
         most.sum::<f32>()
     };
     let [upright, others @ ..] = UPS.map(Vector3::from);
-    let least = SURER * certainty(&upright);
+    let least = settings.surer * certainty(&upright);
     let rated = others.map(|up| (certainty(&up), up));
     let surest = rated.into_iter().filter(|r| r.0 > least);
     let up = surest.max_by(|a, b| a.0.total_cmp(&b.0));
-    level_camera(&up.map_or(upright, |r| r.1), ASSUMED_HEIGHT)
+    level_camera(&up.map_or(upright, |r| r.1), settings.assumed_height)
 }
 
 /// Pose of a camera with a level view for its direction against gravity.

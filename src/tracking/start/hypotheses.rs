@@ -3,6 +3,7 @@
 use crate::fit::{FitContext, FitScratch, evaluate};
 use crate::model::Limb;
 use crate::segment::{Extremity, extremities};
+use crate::settings::HypothesisSettings;
 use nalgebra::{UnitQuaternion, Vector3};
 use tryon_body::parts::BodyPart;
 use tryon_body::{BoneTransforms, JointMotion, Pose};
@@ -22,43 +23,25 @@ const UPPER_ARMS: [[f64; 3]; 9] = [
 ];
 /// Directions of a thigh that stands or sits, as [`UPPER_ARMS`].
 const RESTING_LEGS: [[f64; 3]; 2] = [[0.05, -1.0, 0.0], [0.1, -0.8, 0.5]];
-/// Bends of the elbow in the first pass over arms, radians.
-const BENDS: [f64; 2] = [0.1, 1.4];
-/// Bends of elbow or knee in the second pass, radians.
-const MORE_BENDS: [f64; 3] = [0.7, 1.4, 2.2];
-/// Turns of the upper arm about its own axis in the second pass, radians.
-const TWISTS: [f64; 5] = [-1.8, -0.9, 0.0, 0.9, 1.8];
-/// Turns of a thigh about its own axis with the knee at an extremity, radians.
-const LEG_TWISTS: [f64; 3] = [-0.9, 0.0, 0.9];
-/// Cost of a bend, m² per point and squared radian; a hand of ten readings is worth 7·10⁻⁵. Without it a straight arm,
-/// explained by a bent one turned inside out, stays so.
-const BEND_COST: f64 = 1e-5;
-/// Cost of a twist, m² per point and squared radian; see [`BEND_COST`].
-const TWIST_COST: f64 = 3e-5;
-/// Upper arms that enter the second pass.
-const ARM_FINALISTS: usize = 3;
-
-/// Extremities to detect: head, hands, feet, and elbows of hands that lie on the body.
-const EXTREMITIES: usize = 7;
-/// Limb lengths from its root beyond which an extremity is not this limb's.
-const STRETCH: f64 = 1.15;
-/// Depth of a joint below its extremity on the skin, metres.
-const BEHIND: f64 = 0.02;
-/// Distance of a hinge from its root, in lengths of the upper bone, at which a point may be the hinge.
-const HINGE_RANGE: std::ops::Range<f64> = 0.5..1.4;
-/// Longest pair in comparisons of hypotheses, metres.
-const REACH: f32 = 0.15;
 
 /// A point of the skin displaced along its viewing ray to the bone.
-fn inside(p: &P3) -> P3d {
+fn inside(p: &P3, settings: &HypothesisSettings) -> P3d {
     let p = p.cast::<f64>();
-    p + p.coords.try_normalize(0.0).unwrap_or_else(Vector3::z) * BEHIND
+    p + p.coords.try_normalize(0.0).unwrap_or_else(Vector3::z) * settings.behind
 }
 
 /// Hypotheses of limbs in the readings of one frame.
 pub(crate) struct Hypotheses<'a> {
     context: FitContext<'a>,
     extremities: Vec<Extremity>,
+}
+
+/// Direction of a limb's root bone (rest frame of its parent), bend of its hinge and twist about the bone, radians.
+#[derive(Clone, Copy)]
+struct LimbAim {
+    direction: Vector3<f64>,
+    bend: f64,
+    twist: f64,
 }
 
 /// A hypothesis of an arm.
@@ -72,15 +55,17 @@ struct ArmPose {
 impl<'a> Hypotheses<'a> {
     /// Detects the extremities around `torso`, camera frame, metres.
     pub(crate) fn new(context: &FitContext<'a>, torso: &P3) -> Self {
+        let settings = &context.model.config.segment.extremities;
         let observation = context.observation;
         Self {
             context: *context,
-            extremities: extremities(observation.grid, observation.cells, torso, EXTREMITIES),
+            extremities: extremities(observation.grid, observation.cells, torso, settings),
         }
     }
 
     /// The arm pose of one side (0 left, 1 right) of least cost.
     pub(crate) fn choose_arm(&self, pose: &Pose, side: usize, scratch: &mut FitScratch) -> Pose {
+        let settings = &self.context.model.config.start.hypotheses;
         let Some(arm) = &self.context.model.arms[side] else {
             return pose.clone();
         };
@@ -93,22 +78,40 @@ impl<'a> Hypotheses<'a> {
             });
         }
         for direction in self.upper_arms(pose, arm, side) {
-            for bend in BENDS {
-                let hypothesis = self.aimed_arm(pose, side, (direction, bend, 0.0), scratch);
+            for bend in settings.bends {
+                let hypothesis = self.aimed_arm(
+                    pose,
+                    side,
+                    LimbAim {
+                        direction,
+                        bend,
+                        twist: 0.0,
+                    },
+                    scratch,
+                );
                 all.push(hypothesis);
             }
         }
         all.sort_by(|a, b| a.cost.total_cmp(&b.cost));
         let mut finalists: Vec<Vector3<f64>> = Vec::new();
         for direction in all.iter().filter_map(|a| a.direction) {
-            if finalists.len() < ARM_FINALISTS && !finalists.contains(&direction) {
+            if finalists.len() < settings.arm_finalists && !finalists.contains(&direction) {
                 finalists.push(direction);
             }
         }
         for direction in finalists {
-            for bend in MORE_BENDS {
-                for twist in TWISTS {
-                    all.push(self.aimed_arm(pose, side, (direction, bend, twist), scratch));
+            for bend in settings.more_bends {
+                for twist in settings.twists {
+                    all.push(self.aimed_arm(
+                        pose,
+                        side,
+                        LimbAim {
+                            direction,
+                            bend,
+                            twist,
+                        },
+                        scratch,
+                    ));
                 }
             }
         }
@@ -120,6 +123,7 @@ impl<'a> Hypotheses<'a> {
     /// The leg pose of one side (0 left, 1 right) of least cost: as it is, with the knee bent, with the foot or the knee
     /// at an extremity.
     pub(crate) fn choose_leg(&self, pose: &Pose, side: usize, scratch: &mut FitScratch) -> Pose {
+        let settings = &self.context.model.config.start.hypotheses;
         let Some(leg) = &self.context.model.legs[side] else {
             return pose.clone();
         };
@@ -127,13 +131,21 @@ impl<'a> Hypotheses<'a> {
         let knee = &skeleton.joints()[leg.hinge].name;
         let mut hypotheses = self.at_extremities(pose, leg);
         let directions = self.towards(pose, leg, self.extremities.iter().map(|e| e.point));
-        for bend in MORE_BENDS {
+        for bend in settings.more_bends {
             let mut bent = pose.clone();
             bent.set(skeleton, knee, &[bend]);
             hypotheses.push(bent);
             for &direction in &directions {
-                for twist in LEG_TWISTS {
-                    hypotheses.push(self.aimed(pose, leg, direction, (bend, twist)));
+                for twist in settings.leg_twists {
+                    hypotheses.push(self.aimed(
+                        pose,
+                        leg,
+                        &LimbAim {
+                            direction,
+                            bend,
+                            twist,
+                        },
+                    ));
                 }
             }
         }
@@ -148,7 +160,8 @@ impl<'a> Hypotheses<'a> {
     }
 
     fn cost(&self, pose: &Pose, scratch: &mut FitScratch) -> f64 {
-        evaluate(&self.context, pose, REACH, scratch).cost
+        let settings = &self.context.model.config.start.hypotheses;
+        evaluate(&self.context, pose, settings.reach, scratch).cost
     }
 
     /// Directions of the upper arm for the first pass. An extremity may be the elbow, and a path to one passes it.
@@ -164,19 +177,28 @@ impl<'a> Hypotheses<'a> {
         directions
     }
 
-    /// The arm of `side` along a direction, with a bend and a twist, radians.
+    /// The arm of `side` along a direction; its twist counts outward.
     fn aimed_arm(
         &self,
         pose: &Pose,
         side: usize,
-        (direction, bend, twist): (Vector3<f64>, f64, f64),
+        aim: LimbAim,
         scratch: &mut FitScratch,
     ) -> ArmPose {
+        let settings = &self.context.model.config.start.hypotheses;
         let pose = match &self.context.model.arms[side] {
-            Some(arm) => self.aimed(pose, arm, direction, (bend, twist * outward_sign(side))),
+            Some(arm) => {
+                let twist = aim.twist * outward_sign(side);
+                self.aimed(pose, arm, &LimbAim { twist, ..aim })
+            }
             None => pose.clone(),
         };
-        let effort = BEND_COST * bend * bend + TWIST_COST * twist * twist;
+        let LimbAim {
+            direction,
+            bend,
+            twist,
+        } = aim;
+        let effort = settings.bend_cost * bend * bend + settings.twist_cost * twist * twist;
         ArmPose {
             cost: self.cost(&pose, scratch) + effort,
             direction: (twist == 0.0).then_some(direction),
@@ -184,32 +206,26 @@ impl<'a> Hypotheses<'a> {
         }
     }
 
-    /// A pose with the limb's root aimed along `direction` (rest frame of its parent), twisted about it, and the hinge
-    /// bent, radians.
-    fn aimed(
-        &self,
-        pose: &Pose,
-        limb: &Limb,
-        direction: Vector3<f64>,
-        (bend, twist): (f64, f64),
-    ) -> Pose {
+    /// A pose with the limb's root aimed along a direction, twisted about it, and the hinge bent.
+    fn aimed(&self, pose: &Pose, limb: &Limb, aim: &LimbAim) -> Pose {
         let skeleton = self.context.model.template.skeleton();
         let joints = skeleton.joints();
         let (root, hinge) = (&joints[limb.root], &joints[limb.hinge]);
         let mut aimed = pose.clone();
-        let turn = UnitQuaternion::rotation_between(&(hinge.rest - root.rest), &direction);
+        let turn = UnitQuaternion::rotation_between(&(hinge.rest - root.rest), &aim.direction);
         if let (JointMotion::Ball { .. }, Some(turn)) = (&root.motion, turn) {
-            let about = UnitQuaternion::from_scaled_axis(direction * twist);
+            let about = UnitQuaternion::from_scaled_axis(aim.direction * aim.twist);
             let rotation = log_so3(&(about * turn));
             aimed.set(skeleton, &root.name, rotation.as_slice());
         }
-        aimed.set(skeleton, &hinge.name, &[bend]);
+        aimed.set(skeleton, &hinge.name, &[aim.bend]);
         aimed.clamp_to_limits(skeleton);
         aimed
     }
 
-    /// Cost of the bend and twist of a limb; see [`BEND_COST`].
+    /// Cost of the bend and twist of a limb; see `bend_cost`.
     fn effort(&self, pose: &Pose, limb: &Limb) -> f64 {
+        let settings = &self.context.model.config.start.hypotheses;
         let joints = self.context.model.template.skeleton().joints();
         let Some(child) = joints.iter().position(|j| j.parent == Some(limb.root)) else {
             return 0.0;
@@ -223,7 +239,7 @@ impl<'a> Hypotheses<'a> {
         ));
         let twist = 2.0 * (turn.imag().dot(&along) / turn.w.abs().max(f64::MIN_POSITIVE)).atan();
         let bend = pose.angles[limb.angles[3]];
-        BEND_COST * bend * bend + TWIST_COST * twist * twist
+        settings.bend_cost * bend * bend + settings.twist_cost * twist * twist
     }
 
     /// Position of the limb's root and rotation of its parent bone.
@@ -238,18 +254,19 @@ impl<'a> Hypotheses<'a> {
 
     /// Poses with the limb's end at each extremity within its length, and its hinge on the path over the surface there.
     fn at_extremities(&self, pose: &Pose, limb: &Limb) -> Vec<Pose> {
+        let settings = &self.context.model.config.start.hypotheses;
         let (model, rest) = (self.context.model, &self.context.body.rest);
         let skeleton = model.template.skeleton();
         let (root, _) = self.root_of(pose, limb);
         let lower = (rest.joints[limb.tip] - rest.joints[limb.hinge]).norm();
         let mut out = Vec::new();
         for end in &self.extremities {
-            let target = inside(&end.point);
+            let target = inside(&end.point, settings);
             let line = target - root;
-            if line.norm() > STRETCH * limb.length(rest) || line.norm() < f64::EPSILON {
+            if line.norm() > settings.stretch * limb.length(rest) || line.norm() < f64::EPSILON {
                 continue;
             }
-            let hinge = inside(&end.along(lower as f32));
+            let hinge = inside(&end.along(lower as f32), settings);
             let mut reached = pose.clone();
             limb.reach(skeleton, rest, &mut reached, &target, Some(&hinge));
             out.push(reached);
@@ -264,12 +281,14 @@ impl<'a> Hypotheses<'a> {
         limb: &Limb,
         points: impl Iterator<Item = P3>,
     ) -> Vec<Vector3<f64>> {
+        let settings = &self.context.model.config.start.hypotheses;
+        let [nearest, farthest] = settings.hinge_range;
         let joints = &self.context.body.rest.joints;
         let (root, parent) = self.root_of(pose, limb);
         let upper = (joints[limb.hinge] - joints[limb.root]).norm();
         points
-            .map(|p| inside(&p))
-            .filter(|p| HINGE_RANGE.contains(&((p - root).norm() / upper)))
+            .map(|p| inside(&p, settings))
+            .filter(|p| (nearest..farthest).contains(&((p - root).norm() / upper)))
             .map(|p| (parent.inverse() * (p - root)).normalize())
             .collect()
     }
@@ -283,6 +302,7 @@ pub(crate) fn resting_limb(
     part: BodyPart,
     bones: &mut BoneTransforms,
 ) -> Option<Pose> {
+    let settings = &context.model.config.start.hypotheses;
     let (_, limb) = context.model.limbs().find(|(p, _)| *p == part)?;
     let (side, directions): (usize, &[[f64; 3]]) = match part {
         BodyPart::LeftArm => (0, &UPPER_ARMS),
@@ -296,7 +316,9 @@ pub(crate) fn resting_limb(
         extremities: Vec::new(),
     };
     let sign = outward_sign(side);
-    let all = directions.iter().flat_map(|d| BENDS.map(|bend| (d, bend)));
+    let all = directions
+        .iter()
+        .flat_map(|d| settings.bends.map(|bend| (d, bend)));
     let mut misplaced = |pose: &Pose| {
         pose.bones(context.model.template.skeleton(), &context.body.rest, bones);
         let trunk = context.model.trunk.and_then(|t| t.column(bones));
@@ -305,7 +327,15 @@ pub(crate) fn resting_limb(
     let now = misplaced(pose);
     let aimed = all.map(|(d, bend)| {
         let direction = Vector3::new(d[0] * sign, d[1], d[2]).normalize();
-        hypotheses.aimed(pose, limb, direction, (bend, 0.0))
+        hypotheses.aimed(
+            pose,
+            limb,
+            &LimbAim {
+                direction,
+                bend,
+                twist: 0.0,
+            },
+        )
     });
     let rated = aimed.map(|pose| (misplaced(&pose), pose));
     let least = rated.min_by_key(|(points, _)| *points);

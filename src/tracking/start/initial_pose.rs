@@ -3,11 +3,9 @@
 
 use super::body_proposals::{BodyProposals, about_body, upright};
 use super::hypotheses::Hypotheses;
-use crate::fit::{
-    FitContext, FitReport, FitScratch, HYPOTHESIS_TERMS, START, Schedule, evaluate, fit_pose,
-};
+use crate::fit::{FitContext, FitReport, FitScratch, FitTerms, evaluate, fit_pose};
 use crate::registration::Observation;
-use crate::shape::ADULTS;
+use crate::settings::{Schedule, StartSettings, TrackerConfig};
 use nalgebra::{UnitQuaternion, Vector3};
 use std::f64::consts::PI;
 use tryon_body::Pose;
@@ -25,33 +23,8 @@ pub(crate) struct Outline {
     pub stature: Option<f64>,
 }
 
-/// Half the depth of a chest, metres: readings lie on the front, joints in the middle.
-const HALF_DEPTH: f64 = 0.11;
-/// Horizontal distance from the torso within which the crown is searched, metres; farther out are raised arms.
-const HEAD_BESIDE: f32 = 0.22;
-/// Height above the floor up to which segmentation takes readings for floor, metres: soles are that much lower.
-const SOLES: f64 = 0.02;
-/// Height of a floor above the lowest reading from which it is another floor than the subject's, metres.
-const AFLOAT: f64 = 0.1;
-/// Share of the largest distance to the silhouette above which a cell is torso.
-const TORSO_SHARE: [u32; 2] = [8, 10];
-/// Turns about the vertical to try, radians, for either facing.
-const YAWS: [f64; 3] = [0.0, 0.6, -0.6];
 /// Turns of bodies that face the camera and that face away.
 const FACINGS: [f64; 2] = [0.0, PI];
-/// Best trunks of each facing that get arms and a full fit; each costs a quarter of the search. Front and back of a trunk
-/// cost nearly the same, so that they compare only after the full fit.
-const FINALISTS: [usize; 2] = [2, 1];
-/// Iterations of a trunk's fit: enough to rank yaws.
-const TRUNK_ITERATIONS: usize = 3;
-/// Cost of a fitted proposal above which the search goes on, m² per point: a lost foot costs as little as that.
-const POOR: f64 = 1.5e-4;
-/// Longest pairs by which trunks and final poses compare, metres.
-const REACH: [f32; 2] = [0.15, 0.10];
-/// Ratio of the first two variances above which the body is long enough for its axis to be its lean.
-const ELONGATION: f64 = 4.0;
-/// Cosines between lean and vertical that count, 60° to 15°: arms bend the axis by less, and nobody leans more.
-const LEAN_RANGE: std::ops::Range<f64> = 0.5..0.966;
 
 /// Points of the subject's cells that have a reading.
 fn points<'a>(observation: &'a Observation<'_>) -> impl Iterator<Item = (usize, P3)> + 'a {
@@ -78,12 +51,14 @@ fn silhouette_distance(observation: &Observation<'_>) -> Vec<u16> {
 }
 
 /// Middle of the readings farthest inside the silhouette, camera frame, metres.
-fn torso(observation: &Observation<'_>) -> Option<P3> {
+fn torso(observation: &Observation<'_>, settings: &StartSettings) -> Option<P3> {
     let distance = silhouette_distance(observation);
     let widest = points(observation).map(|(c, _)| distance[c]).max()?;
     let (mut sum, mut n) = (Vector3::zeros(), 0.0f32);
     for (c, p) in points(observation) {
-        if u32::from(distance[c]) * TORSO_SHARE[1] >= u32::from(widest) * TORSO_SHARE[0] {
+        if u32::from(distance[c]) * settings.torso_share[1]
+            >= u32::from(widest) * settings.torso_share[0]
+        {
             sum += p.coords;
             n += 1.0;
         }
@@ -98,23 +73,25 @@ pub(crate) fn outline(
     up: &Vector3<f32>,
     cut_below: bool,
     floor: Option<f64>,
+    config: &TrackerConfig,
 ) -> Option<Outline> {
-    let torso = torso(observation)?;
+    let settings = &config.start;
+    let torso = torso(observation, settings)?;
     let right = up.cross(&Vector3::z()).try_normalize(0.0)?;
     let height = |p: &P3| up.dot(&p.coords);
     let crown = points(observation)
         .map(|(_, p)| p)
-        .filter(|p| right.dot(&(p - torso)).abs() < HEAD_BESIDE)
+        .filter(|p| right.dot(&(p - torso)).abs() < settings.head_beside)
         .max_by(|a, b| height(a).total_cmp(&height(b)))?;
     let lowest = points(observation)
         .map(|(_, p)| height(&p))
         .fold(f32::INFINITY, f32::min);
-    let visible_height = f64::from(height(&crown) - lowest) + SOLES;
+    let visible_height = f64::from(height(&crown) - lowest) + settings.soles;
     let over_floor = floor
         .map(|f| f64::from(height(&crown)) + f)
-        .filter(|h| *h > visible_height - AFLOAT);
+        .filter(|h| *h > visible_height - settings.afloat);
     // Shorter, somebody not known to stand on a floor may lack the legs (black trousers).
-    let is_whole = !cut_below && visible_height > ADULTS.start;
+    let is_whole = !cut_below && visible_height > config.shape.size.adults[0];
     let stature = over_floor.or(is_whole.then_some(visible_height));
     Some(Outline {
         torso,
@@ -153,15 +130,16 @@ pub(crate) fn initial_pose(
     prior: &StartPrior<'_>,
     scratch: &mut FitScratch,
 ) -> Option<(Pose, FitReport)> {
-    let proposed = scratch.with_terms(HYPOTHESIS_TERMS, |s| prior.proposals.poses(context, s));
+    let settings = &context.model.config.start;
+    let terms = FitTerms::hypothesis(&context.model.config.fit);
+    let proposed = scratch.with_terms(terms, |s| prior.proposals.poses(context, s));
     let mut best = prior.best(context, proposed, scratch);
-    let is_poor = |b: &FittedStart| b.fit.cost > POOR;
+    let is_poor = |b: &FittedStart| b.fit.cost > settings.poor;
     if prior.proposals.is_doubtful() || best.as_ref().is_none_or(is_poor) {
         let proposed = best.as_ref().filter(|_| !prior.proposals.is_doubtful());
         let proposed = proposed.map(|b| b.pose.clone());
-        let searched = scratch.with_terms(HYPOTHESIS_TERMS, |s| {
-            searched(context, outline, (prior.up, proposed), s)
-        });
+        let searched =
+            scratch.with_terms(terms, |s| searched(context, outline, prior.up, proposed, s));
         let other = prior.best(context, searched, scratch);
         best = best
             .into_iter()
@@ -179,9 +157,10 @@ impl StartPrior<'_> {
         poses: Vec<Pose>,
         scratch: &mut FitScratch,
     ) -> Option<FittedStart> {
+        let settings = &context.model.config.start;
         let fitted = |mut pose: Pose| {
-            fit_pose(context, &mut pose, &START, scratch);
-            let fit = evaluate(context, &pose, REACH[1], scratch);
+            fit_pose(context, &mut pose, &context.model.config.fit.start, scratch);
+            let fit = evaluate(context, &pose, settings.reach[1], scratch);
             let cost = fit.cost * self.proposals.prior_cost(&pose, self.recent);
             FittedStart { cost, pose, fit }
         };
@@ -194,12 +173,14 @@ impl StartPrior<'_> {
 fn searched(
     context: &FitContext<'_>,
     outline: &Outline,
-    (up, proposed): (&Vector3<f64>, Option<Pose>),
+    up: &Vector3<f64>,
+    proposed: Option<Pose>,
     scratch: &mut FitScratch,
 ) -> Vec<Pose> {
+    let settings = &context.model.config.start;
     let mut best: Vec<(f64, Pose)> = proposed.map(|p| (0.0, p)).into_iter().collect();
-    for (facing, finalists) in FACINGS.into_iter().zip(FINALISTS) {
-        let mut trunks = trunks(context, outline, (up, facing), scratch);
+    for (facing, finalists) in FACINGS.into_iter().zip(settings.finalists) {
+        let mut trunks = trunks(context, outline, up, facing, scratch);
         trunks.sort_by(|a, b| a.0.total_cmp(&b.0));
         best.extend(trunks.into_iter().take(finalists));
     }
@@ -220,21 +201,23 @@ fn searched(
 fn trunks(
     context: &FitContext<'_>,
     outline: &Outline,
-    (up, facing): (&Vector3<f64>, f64),
+    up: &Vector3<f64>,
+    facing: f64,
     scratch: &mut FitScratch,
 ) -> Vec<(f64, Pose)> {
+    let settings = &context.model.config.start;
     let skeleton = context.model.template.skeleton();
     let schedule = Schedule {
-        iterations: TRUNK_ITERATIONS,
-        ..START
+        iterations: settings.trunk_iterations,
+        ..context.model.config.fit.start
     };
     let mut out = Vec::new();
-    for lean in leans(context.observation, up, outline) {
-        for yaw in YAWS {
+    for lean in leans(context.observation, up, outline, settings) {
+        for yaw in settings.yaws {
             let root = trunk_root(context, outline, &lean, facing_camera(&lean, facing + yaw));
             let mut pose = Pose::rest(skeleton, root);
             fit_pose(context, &mut pose, &schedule, scratch);
-            let cost = evaluate(context, &pose, REACH[0], scratch).cost;
+            let cost = evaluate(context, &pose, settings.reach[0], scratch).cost;
             out.push((cost, pose));
         }
     }
@@ -249,24 +232,32 @@ fn trunk_root(
     lean: &Vector3<f64>,
     rotation: UnitQuaternion<f64>,
 ) -> Rigid<tryon_geometry::math::Camera, tryon_geometry::math::Body> {
+    let settings = &context.model.config.start;
     let (crown, chest) = (context.model.crown, context.model.chest);
     let at = |j: usize| context.body.rest.joints[j].coords;
     let front = outline.torso.coords.cast::<f64>();
     let away = front.try_normalize(0.0).unwrap_or_else(Vector3::z);
-    let mut t = front + away * HALF_DEPTH - rotation * at(chest);
+    let mut t = front + away * settings.half_depth - rotation * at(chest);
     let placed = rotation * at(crown) + t;
     t += lean * (outline.crown.coords.cast::<f64>() - placed).dot(lean);
     Rigid::from_parts(t, rotation)
 }
 
 /// Upright directions to try: against gravity, and the long principal axis of a whole body that leans.
-fn leans(observation: &Observation<'_>, up: &Vector3<f64>, outline: &Outline) -> Vec<Vector3<f64>> {
+fn leans(
+    observation: &Observation<'_>,
+    up: &Vector3<f64>,
+    outline: &Outline,
+    settings: &StartSettings,
+) -> Vec<Vector3<f64>> {
     let mut out = vec![*up];
     let points: Vec<P3> = points(observation).map(|(_, p)| p).collect();
     if let (Some(_), Some((_, axes, variance))) = (outline.stature, principal_axes(&points)) {
         let axis = axes.column(0).into_owned();
         let axis = if axis.dot(up) < 0.0 { -axis } else { axis };
-        if variance[0] > ELONGATION * variance[1] && LEAN_RANGE.contains(&axis.dot(up)) {
+        let [least, most] = settings.lean_range;
+        let leans = (least..most).contains(&axis.dot(up));
+        if leans && variance[0] > settings.elongation * variance[1] {
             out.push(axis);
         }
     }

@@ -2,11 +2,9 @@
 
 use crate::model::{NECK_CLASS, PartClasses, PartKind};
 use crate::segment::part_forest::JointProposal;
+use crate::settings::ProposalSettings;
 use tryon_body::parts::BodySide;
 use tryon_geometry::math::P3;
-
-/// Largest distance between the halves of one head, metres.
-const HEAD: f32 = 0.20;
 
 /// A place for the middle of two joints, or of one joint twice.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -30,7 +28,11 @@ pub struct JointProposals {
 
 impl JointProposals {
     /// Proposals for the anchors of a template. The halves of the head become one place.
-    pub fn new(classes: &PartClasses, proposals: &[JointProposal]) -> Self {
+    pub fn new(
+        classes: &PartClasses,
+        proposals: &[JointProposal],
+        settings: &ProposalSettings,
+    ) -> Self {
         let mut anchors = Vec::with_capacity(proposals.len());
         for p in proposals {
             let Some(joints) = classes.anchor(p.class) else {
@@ -43,7 +45,7 @@ impl JointProposals {
                 weight: p.weight,
             });
         }
-        join_heads(&mut anchors);
+        join_heads(&mut anchors, settings);
         Self { anchors }
     }
     /// The proposals of the opposite facing: left and right change places.
@@ -68,13 +70,13 @@ impl JointProposals {
 }
 
 /// Replaces both halves of the head by their weighted middle under the left class; a lone half stays.
-fn join_heads(anchors: &mut Vec<ProposedAnchor>) {
+fn join_heads(anchors: &mut Vec<ProposedAnchor>, settings: &ProposalSettings) {
     let class = |side| PartKind::Head.class(side);
     let [left, right] = [class(BodySide::Left), class(BodySide::Right)];
     let first = |c: u8| anchors.iter().position(|a| a.class == c);
     if let (Some(l), Some(r)) = (first(left), first(right)) {
         let (a, b) = (anchors[l], anchors[r]);
-        if (a.position - b.position).norm() < HEAD {
+        if (a.position - b.position).norm() < settings.head {
             let sum = (a.weight + b.weight).max(f32::MIN_POSITIVE);
             anchors[l].position = a.position + (b.position - a.position) * (b.weight / sum);
             anchors[l].weight = a.weight.max(b.weight);

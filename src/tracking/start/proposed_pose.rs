@@ -7,13 +7,6 @@ use tryon_body::parts::{BodyPart, BodySide};
 use tryon_body::{BoneTransforms, Pose, RestBody};
 use tryon_geometry::math::{P3, P3d, Rigid, polar_rotation_3};
 
-/// Least number of trunk joints for an alignment.
-const LEAST_JOINTS: usize = 3;
-/// Limb lengths from its root beyond which a proposed end is not this limb's.
-const STRETCH: f64 = 1.2;
-/// Least weight of an end that a limb reaches for; a lighter one is noise and the limb keeps its rest pose.
-const LEAST_END: f32 = 0.1;
-
 /// Poses that proposals of one frame suggest for a body.
 #[derive(Clone, Copy)]
 pub(crate) struct ProposedPoses<'a> {
@@ -38,8 +31,9 @@ type WeightedPair = (Vector3<f64>, Vector3<f64>, f64);
 impl ProposedPoses<'_> {
     /// Rest pose with the trunk at its proposed joints; `None` with too few of them.
     pub(crate) fn trunk(&self) -> Option<Pose> {
+        let settings = &self.model.config.start.proposals;
         let pairs = self.trunk_pairs();
-        if pairs.len() < LEAST_JOINTS {
+        if pairs.len() < settings.least_joints {
             return None;
         }
         let root = procrustes(&pairs)?;
@@ -79,6 +73,7 @@ impl ProposedPoses<'_> {
     /// `pose` with one limb at each proposed end within its length, heaviest first: its hinge at each proposed place, then
     /// free; straight through the hinge without an end.
     pub(crate) fn limb_poses(&self, pose: &Pose, part: BodyPart) -> Vec<Pose> {
+        let settings = &self.model.config.start.proposals;
         let Some(classes) = self.classes(part) else {
             return vec![];
         };
@@ -88,13 +83,13 @@ impl ProposedPoses<'_> {
         let root = bones.joints[limb.root];
         let length = limb.length(self.rest);
         let places = |class: u8| {
-            let heavy = |(_, w): &(P3, f32)| *w >= LEAST_END;
+            let heavy = |(_, w): &(P3, f32)| *w >= settings.least_end;
             let places = self.proposals.of_class(class).filter(heavy);
             places.map(|(p, _)| P3d::from(p.coords.cast::<f64>()))
         };
         let hinges: Vec<P3d> = places(classes.hinge).collect();
         let mut targets: Vec<(P3d, Option<P3d>)> = Vec::new();
-        for end in places(classes.end).filter(|e| (e - root).norm() < STRETCH * length) {
+        for end in places(classes.end).filter(|e| (e - root).norm() < settings.stretch * length) {
             targets.extend(hinges.iter().map(|h| (end, Some(*h))));
             targets.push((end, None));
         }
@@ -180,7 +175,7 @@ mod tests {
                 })
             })
             .collect();
-        JointProposals::new(classes, &found)
+        JointProposals::new(classes, &found, &scene.model.config.start.proposals)
     }
 
     #[test]

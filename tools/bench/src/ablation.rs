@@ -67,7 +67,9 @@ pub fn variants() -> Vec<Variant> {
     };
     add("default", "", &|_| {});
     for n in [1usize, 2, 4, 8, 16] {
-        add("iterations", &n.to_string(), &|c| c.iterations = n);
+        add("iterations", &n.to_string(), &|c| {
+            c.fit.track.iterations = n
+        });
     }
     for mm in [0.8, 1.5, 3.0, 6.0] {
         add("converged, mm", &mm.to_string(), &|c| {
@@ -102,7 +104,6 @@ pub fn variants() -> Vec<Variant> {
     for damping in [1e-6, 1e-5, 1e-3] {
         add("damping", &format!("{damping:e}"), &|c| c.damping = damping);
     }
-    add("joint limits", "off", &|c| c.joint_limits = false);
     add("rest pose", "off", &|c| c.rest_weight = 0.0);
     for calm in [0.0, 1.5] {
         add("last pose", &calm.to_string(), &|c| c.calm = calm);
@@ -111,11 +112,13 @@ pub fn variants() -> Vec<Variant> {
     add("repairs of lost limbs", "off", &|c| c.rescue = false);
     add("edges", "0.1", &|c| c.edge_weight = 0.1);
     add("edges", "1", &|c| c.edge_weight = 1.0);
-    add("free space", "0.1", &|c| c.free_space = 0.1);
-    add("prediction", "off", &|c| c.predict = false);
-    add("pull", "off", &|c| c.pull = false);
+    add("prediction", "off", &|c| c.fit.prediction.longest = 0.0);
+    add("pull", "off", &|c| {
+        (c.fit.track.pull, c.fit.start.pull) = (0.0, 0.0)
+    });
     add("skipping", "nothing", &|c| {
-        (c.skip_coarse, c.skip_settled, c.skip_unchanged) = (false, false, false)
+        (c.skip_coarse, c.skip_unchanged) = (false, false);
+        c.shape.surface.settled = 0.0;
     });
     add("size", "off", &|c| c.adapt_size = false);
     add("displacements", "off", &|c| c.displacements = false);

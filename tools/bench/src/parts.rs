@@ -6,7 +6,7 @@ use tryon_geometry::math::order_statistics::{median, percentile};
 use tryon_synth::labelled::{LabelledFrame, LabelledFrames, NO_CLASS};
 use tryon_tracking::part_classes::{PART_CLASSES, PartKind, class_name, kind_of};
 use tryon_tracking::segment::part_forest::{PartForest, PartScratch};
-use tryon_tracking::{JointProposals, facing};
+use tryon_tracking::{JointProposals, ProposalSettings, facing};
 
 /// A proposal within this distance of its anchor counts, metres.
 pub const WITHIN: f64 = 0.10;
@@ -66,7 +66,8 @@ pub fn score_parts(forest: &PartForest, frames: &LabelledFrames, people: u64) ->
             let found = forest.propose(&frame.person(), &mut scratch);
             out.ms.push(start.elapsed().as_secs_f64() * 1e3);
             out.frames += 1;
-            let proposals = JointProposals::new(frames.classes(), &found);
+            let proposals =
+                JointProposals::new(frames.classes(), &found, &ProposalSettings::default());
             out.add_frame(frames, &frame, &proposals, &scratch);
         }
     }

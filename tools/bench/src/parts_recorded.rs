@@ -14,7 +14,9 @@ use tryon_tracking::segment::part_forest::{PartForest, PartScratch, PersonCells}
 use tryon_tracking::segment::{
     PersonChoice, ScenePlanes, SegmentScratch, find_person, find_planes,
 };
-use tryon_tracking::{JointProposals, PartClasses, facing, yaw_of_trunk};
+use tryon_tracking::{
+    JointProposals, PartClasses, ProposalSettings, SegmentSettings, facing, yaw_of_trunk,
+};
 
 /// Joints of the recordings (lower case, without their side) and the kind whose anchor they are.
 const NAMES: [(&str, PartKind); 8] = [
@@ -88,7 +90,8 @@ impl RecordedPerson {
     fn find(scene: &DepthScene, depth: &DepthImage, planes: &mut Option<ScenePlanes>) -> Self {
         let mut cloud = OrganisedCloud::new(&scene.calibration.depth, None);
         cloud.sample(depth, FARTHEST);
-        let planes = planes.get_or_insert_with(|| find_planes(&cloud));
+        let settings = SegmentSettings::default();
+        let planes = planes.get_or_insert_with(|| find_planes(&cloud, &settings.planes));
         let up = planes
             .floor
             .map_or_else(|| V3::new(0.0, -1.0, 0.0), |f| f.normal.cast());
@@ -96,6 +99,7 @@ impl RecordedPerson {
             &mut cloud,
             planes,
             PersonChoice::First,
+            &settings,
             &mut SegmentScratch::default(),
         )
         .cells;
@@ -136,7 +140,7 @@ pub fn score_recording(
         }
         let person = RecordedPerson::find(&scene, frame.depth, &mut planes);
         let found = forest.propose(&person.cells(), &mut scratch);
-        let proposals = JointProposals::new(&part_classes, &found);
+        let proposals = JointProposals::new(&part_classes, &found, &ProposalSettings::default());
         let of = |(class, truth): (&Option<u8>, &P3d)| {
             let places = proposals.of_class((*class)?);
             Some(places.map(|(p, _)| p.cast::<f64>() - truth).collect())

@@ -150,7 +150,7 @@ pub fn stills(
     let truth = JointsFile::read(&folder.join("joints.json"))
         .map_err(|e| fault(format!("joints.json: {e}")))?;
     let mut comparison = JointComparison::new(template.skeleton(), &truth.joint_names);
-    let model = TrackerModel::new(template.clone(), scene.calibration.clone(), config.clone());
+    let model = TrackerModel::new(template.clone(), scene.calibration.clone(), *config);
     let mut workspace = Workspace::default();
     let mut out = StillsOutcome::default();
     let clock = Instant::now();

@@ -186,7 +186,7 @@ pub fn follow(
     scene: &DepthScene,
     mut each: impl FnMut(usize, &TrackerModel, &TrackerState, &StepReport, &mut Workspace),
 ) -> TrackOutcome {
-    let model = TrackerModel::new(template.clone(), scene.calibration.clone(), config.clone());
+    let model = TrackerModel::new(template.clone(), scene.calibration.clone(), *config);
     let mut state = TrackerState::new(&model);
     let mut workspace = Workspace::default();
     let mut comparison = TruthComparison::new(template, scene);

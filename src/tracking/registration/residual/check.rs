@@ -1,8 +1,8 @@
 //! Finite-difference checks of residuals on a small posed chain.
 
 use super::{
-    EdgeResidual, FreeSpaceResidual, LimbMotion, PointTerm, Residual, RowTerm, SurfaceMetric,
-    SurfaceNormals, SurfaceResidual,
+    EdgeResidual, LimbMotion, PointTerm, Residual, RowTerm, SurfaceMetric, SurfaceNormals,
+    SurfaceResidual,
 };
 use crate::registration::{Dof, ModelPoints, NormalEquations, Pair, ROOT_UNKNOWNS, is_ancestor};
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
@@ -192,7 +192,8 @@ impl Scan {
     pub(super) fn surface(
         &self,
         model: &ModelPoints<'_>,
-        (normals, robust): (SurfaceNormals, bool),
+        normals: SurfaceNormals,
+        robust: bool,
         weight: f64,
         visit: &mut dyn FnMut(&PointTerm),
     ) {
@@ -213,6 +214,7 @@ impl Scan {
                 normals,
                 robust,
                 sigma: 0.05,
+                pull_length: 0.12,
             },
         };
         surface.for_each(visit);
@@ -234,24 +236,9 @@ impl Scan {
             grid: &self.grid,
             pairs: &self.cells(0..self.points.len() as u32),
             weight,
-            sigma: 0.05,
+            sigma: 0.1,
         };
         edge.for_each(visit);
-    }
-
-    pub(super) fn free_space(
-        &self,
-        model: &ModelPoints<'_>,
-        weight: f64,
-        visit: &mut dyn FnMut(&PointTerm),
-    ) {
-        let free = FreeSpaceResidual {
-            model,
-            grid: &self.grid,
-            in_front: &self.cells(0..3),
-            weight,
-        };
-        free.for_each(visit);
     }
 
     /// Checks a residual of points; `each` visits its terms for a posed model and a weight.

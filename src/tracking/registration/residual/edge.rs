@@ -4,9 +4,6 @@ use super::{PointTerm, Residual};
 use crate::registration::{GemanMcClure, Metric, ModelPoints};
 use tryon_geometry::spatial::OrganisedCloud;
 
-/// Least width of the robust kernel, metres: a point in free space may be far off its outline.
-const LEAST_SIGMA: f64 = 0.10;
-
 /// Model points paired with cells of the subject's outline.
 #[derive(Clone, Copy)]
 pub struct EdgeResidual<'a> {
@@ -18,7 +15,7 @@ pub struct EdgeResidual<'a> {
     pub pairs: &'a [(u32, u32)],
     /// Weight of a pair at distance 0 (λₑ of eq. 12).
     pub weight: f64,
-    /// Width of the robust kernel, metres; at least 0.1.
+    /// Width of the robust kernel, metres.
     pub sigma: f64,
 }
 
@@ -27,9 +24,7 @@ impl Residual for EdgeResidual<'_> {
 
     #[inline]
     fn for_each(&self, mut visit: impl FnMut(&PointTerm)) {
-        let kernel = GemanMcClure {
-            sigma: self.sigma.max(LEAST_SIGMA),
-        };
+        let kernel = GemanMcClure { sigma: self.sigma };
         for &(i, cell) in self.pairs {
             let i = i as usize;
             let p = self.model.positions[i].coords.cast::<f64>();

@@ -3,6 +3,7 @@
 
 use super::{Residual, RowTerm};
 use crate::registration::{Dof, ROOT_UNKNOWNS, is_ancestor};
+use crate::settings::FloorSettings;
 use nalgebra::Vector3;
 use tryon_geometry::math::P3d;
 use tryon_geometry::spatial::{Label, OrganisedCloud};
@@ -25,35 +26,6 @@ pub struct FloorPlane {
     pub height: f64,
 }
 
-/// Weights per point of a frame.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct FloorWeights {
-    /// Height of a standing joint. It decides against a knee without readings (2·10⁻⁵ per squared radian at a lever of
-    /// 40 cm); a seen knee takes no part.
-    pub height: f64,
-    /// The same for a planted foot: smaller, as an estimated floor is off by 1 to 2 cm, which an almost straight leg
-    /// turns into a decimetre of the foot (docs/decisions).
-    pub planted_height: f64,
-    /// Horizontal place of a planted ankle.
-    pub place: f64,
-    /// Horizontal direction of a planted foot, at the distance of its ball from the ankle.
-    pub direction: f64,
-}
-
-impl Default for FloorWeights {
-    fn default() -> Self {
-        Self {
-            height: 1e-2,
-            planted_height: 2e-3,
-            place: 1e-3,
-            direction: 1e-2,
-        }
-    }
-}
-
-/// Width of the kernel on heights, metres: a foot on a stool is farther off and not pulled down.
-const KERNEL: f64 = 0.15;
-
 /// Hidden joints of one foot.
 #[derive(Clone, Copy)]
 pub struct FloorResidual<'a> {
@@ -75,8 +47,8 @@ pub struct FloorResidual<'a> {
     pub unseen: &'a [f64],
     /// Readings: a joint in view follows them and is left out.
     pub grid: &'a OrganisedCloud,
-    /// Weights.
-    pub weights: FloorWeights,
+    /// Weights and kernel.
+    pub settings: FloorSettings,
 }
 
 /// True for a joint whose cell has a reading of anything: it follows readings instead of the floor.
@@ -140,20 +112,21 @@ impl Residual for FloorResidual<'_> {
             }
             let off = self.floor.height + height - up.dot(&at.coords);
             let weight = match self.planted {
-                Some(_) => self.weights.planted_height,
-                None => self.weights.height,
+                Some(_) => self.settings.planted_height,
+                None => self.settings.height,
             };
-            let weight = weight * (KERNEL * KERNEL / (KERNEL * KERNEL + off * off)).powi(2);
+            let kernel = self.settings.kernel * self.settings.kernel;
+            let weight = weight * (kernel / (kernel + off * off)).powi(2);
             self.row((joint, None), &(up * off), &up, weight, &mut visit);
             let Some([kept_ankle, kept_ball]) = self.planted else {
                 continue;
             };
             let (from, off, weight) = if part == 0 {
-                (None, kept_ankle - at.coords, self.weights.place)
+                (None, kept_ankle - at.coords, self.settings.place)
             } else {
                 let now = at - self.joints[ankle];
                 let kept = kept_ball - kept_ankle;
-                (Some(ankle), kept - now, self.weights.direction)
+                (Some(ankle), kept - now, self.settings.direction)
             };
             for along in [across, up.cross(&across)] {
                 self.row((joint, from), &off, &along, weight, &mut visit);
@@ -191,11 +164,12 @@ mod tests {
                     centre: &chain.centre,
                     unseen: &[1.0; 4],
                     grid: &grid,
-                    weights: FloorWeights {
+                    settings: FloorSettings {
                         height: weight,
                         planted_height: 0.5 * weight,
                         place: 2.0 * weight,
                         direction: weight,
+                        ..FloorSettings::default()
                     },
                 };
                 floor.for_each(visit);

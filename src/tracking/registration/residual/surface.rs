@@ -2,19 +2,8 @@
 
 use super::{PointTerm, Residual};
 use crate::registration::{GemanMcClure, Metric, ModelPoints, Pair};
-use serde::{Deserialize, Serialize};
+use crate::settings::SurfaceNormals;
 use tryon_geometry::spatial::OrganisedCloud;
-
-/// Direction of the point-to-plane distance.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum SurfaceNormals {
-    /// The model's normal.
-    Model,
-    /// The mean of the model's and the reading's normal (symmetric metric of Rusinkiewicz 2019).
-    #[default]
-    Symmetric,
-}
 
 /// Metric and robust kernel of paired points.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -29,11 +18,9 @@ pub struct SurfaceMetric {
     pub robust: bool,
     /// Width of the kernel, metres.
     pub sigma: f64,
+    /// Length beyond which a pair is a pull, and its least kernel width, metres.
+    pub pull_length: f64,
 }
-
-/// Length beyond which a pair is a pull towards an unexplained reading, metres. It is also that pair's least kernel
-/// width, so that the pull is no outlier; at most [`super::super::PairingConfig::distance`] of a first iteration.
-const PULL: f64 = 0.12;
 
 /// Paired model points and readings.
 #[derive(Clone, Copy)]
@@ -67,8 +54,8 @@ impl Residual for SurfaceResidual<'_> {
             }
             let sigma = self.metric.sigma;
             let kernel = GemanMcClure {
-                sigma: if r.norm() > PULL {
-                    sigma.max(PULL)
+                sigma: if r.norm() > self.metric.pull_length {
+                    sigma.max(self.metric.pull_length)
                 } else {
                     sigma
                 },
@@ -105,7 +92,7 @@ mod tests {
         for normals in [SurfaceNormals::Model, SurfaceNormals::Symmetric] {
             for robust in [false, true] {
                 Scan::check_points(|scan, model, weight, visit| {
-                    scan.surface(model, (normals, robust), weight, visit);
+                    scan.surface(model, normals, robust, weight, visit);
                 });
             }
         }
