@@ -22,10 +22,8 @@ use tryon::tracking::segment::part_forest::{PartForest, PartScratch, PersonCells
 use tryon::tracking::segment::{
     Contour, PersonChoice, SegmentScratch, contour, find_person, find_planes,
 };
-use tryon::tracking::{
-    RegistrationSettings, SegmentSettings, TrackerConfig, TrackerModel, TrackerState, Workspace,
-    step,
-};
+use tryon::tracking::settings::{RegistrationSettings, SegmentSettings};
+use tryon::tracking::{TrackerConfig, TrackerModel, TrackerState, Workspace, step};
 
 fn subject(routine: Routine) -> Sequence {
     let setting = Setting {

@@ -68,7 +68,7 @@ pub mod registration;
 mod report;
 pub mod segment;
 mod segmentation;
-mod settings;
+pub mod settings;
 mod shape;
 mod start;
 mod state;
@@ -83,14 +83,7 @@ pub use adaptation::adapt_surface;
 pub use assess::{Agreement, ConfidenceReason, JointConfidence};
 pub use model::{PartClasses, TrackerModel, part_classes};
 pub use report::{Skipped, StepError, StepReport, TrackingStagesMs};
-pub use settings::{
-    AssessSettings, BeliefSettings, ChangeSettings, ConfidenceSettings, ExpectedBodySettings,
-    ExtremitySettings, FitSettings, FloorSettings, HandAssignmentSettings, HandSettings,
-    HiddenLimbSettings, HypothesisSettings, ModelSettings, PersonSettings, PlaneSettings,
-    PredictionSettings, ProposalSettings, RecoverSettings, RefusalSettings, RegistrationSettings,
-    RepairSettings, Schedule, SeatSettings, SegmentSettings, ShapeSettings, SizeSettings,
-    StandingSettings, StartSettings, StepSettings, SurfaceNormals, SurfaceSettings, TrackerConfig,
-};
+pub use settings::TrackerConfig;
 pub use shape::{KnownBody, ShapeFault, SizeEstimate, SurfaceStatistics};
 pub use start::{Facing, JointProposals, ProposedAnchor, facing, yaw_of_joints, yaw_of_trunk};
 pub use state::TrackerState;

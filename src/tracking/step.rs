@@ -135,18 +135,14 @@ impl SegmentedFrame<'_> {
         state: &mut TrackerState,
         report: &StepReport,
     ) -> Option<DepthReference> {
-        let Self {
-            depth,
-            grid,
-            person,
-        } = self;
-        if person.cells.len() >= model.config.segment.least_cells {
+        let (grid, cells) = (self.grid, &self.person.cells);
+        if cells.len() >= model.config.segment.least_cells {
             return is_at_rest(model, state)
-                .then(|| DepthReference::of_cells(depth, grid, &person.cells, report));
+                .then(|| DepthReference::of_cells(self.depth, grid, cells, report));
         }
         // A waiting candidate is tried again though nothing changes.
         let step = model.config.step.empty_stride * grid.stride();
-        (person.rivals == 0).then(|| DepthReference::of_image(depth, step, report))
+        (self.person.rivals == 0).then(|| DepthReference::of_image(self.depth, step, report))
     }
 }
 

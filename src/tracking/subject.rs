@@ -80,24 +80,10 @@ impl StepLog {
         report.skipped.hidden_points = fit.pairs.hidden;
         report.skipped.inconsistent_pairs = fit.pairs.inconsistent;
         report.skipped.searches = fit.pairs.reused;
-        report.skipped.iterations = model
-            .config
-            .fit
-            .track
-            .iterations
-            .saturating_sub(fit.iterations);
+        let most = model.config.fit.track.iterations;
+        report.skipped.iterations = most.saturating_sub(fit.iterations);
         report.skipped.displacements = state.shape.displacements.len();
     }
-}
-
-/// Occasion of a test of the subject.
-struct PersonTest {
-    /// The subject was just found.
-    found: bool,
-    /// The cells are classified already.
-    classified: bool,
-    /// Share of the body's visible points with a reading.
-    matched: f32,
 }
 
 /// A subject in view and the frame that shows it.
@@ -174,19 +160,12 @@ impl SubjectFrame<'_> {
             return Err(LostReason::Residual);
         }
         self.assess(&pose, workspace, log);
-        if config.rescue {
-            self.hide_arms(&mut pose, workspace, log);
-        }
         let mut classified = found;
         if config.rescue {
+            self.hide_arms(&mut pose, workspace, log);
             classified |= self.repair(state, workspace, &mut pose, &mut fit, log);
         }
-        let test = PersonTest {
-            found,
-            classified,
-            matched: fit.matched as f32,
-        };
-        self.test_person(state, workspace, &pose, &test);
+        self.test_person(state, workspace, &pose, classified, fit.matched as f32);
         let agrees = log.report.agreement.wrong() <= settings.most_wrong;
         if state.belief.verdict == Verdict::Nobody || found && !agrees {
             if let Some(before) = before {
@@ -378,12 +357,14 @@ impl SubjectFrame<'_> {
         state: &mut TrackerState,
         workspace: &mut Workspace,
         pose: &Pose<Camera>,
-        test: &PersonTest,
+        classified: bool,
+        matched: f32,
     ) {
-        if !test.classified && state.belief.verdict != Verdict::Unsure {
+        let found = !state.is_following();
+        if !classified && state.belief.verdict != Verdict::Unsure {
             return;
         }
-        if !test.classified {
+        if !classified {
             let person = person_cells(&self.observation, &self.up);
             self.model.forest.classify(&person, &mut workspace.parts);
         }
@@ -391,10 +372,10 @@ impl SubjectFrame<'_> {
         scratch.draw(&self.context(&workspace.body), pose);
         let (image, map) = (&scratch.pairing.image, &workspace.parts.map);
         let (model, observation) = (self.model, &self.observation);
-        let evidence = PersonEvidence::measure(model, observation, image, map, test.matched);
+        let evidence = PersonEvidence::measure(model, observation, image, map, matched);
         let config = &model.config;
         let settings = &config.assess.belief;
-        if test.found {
+        if found {
             let candidate = self.person.candidate.as_ref();
             let refusals = &config.segment.refusals;
             let refused = candidate.map_or(0.0, |c| state.refusals.log_odds(c, refusals));

@@ -52,15 +52,6 @@ impl PartArea {
     }
 }
 
-/// Limits of free space in one frame.
-#[derive(Clone, Copy)]
-struct FreeLimits {
-    /// Width of the seam, cells.
-    seam: u16,
-    /// Difference in depth of different surfaces, metres.
-    apart: f32,
-}
-
 /// Scratch of the comparison.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct AgreementScratch {
@@ -96,22 +87,19 @@ impl AgreementScratch {
         chessboard_distances(grid, is_subject, nothing, &mut self.to_subject);
         chessboard_distances(grid, is_body, nothing, &mut self.to_body);
         let seam = seam(observation, settings);
-        let limits = FreeLimits {
-            seam,
-            apart: settings.apart,
-        };
+        let apart = settings.apart;
 
         let (mut area, mut uncovered) = (0u32, 0u32);
         let mut parts = [PartArea::default(); PARTS];
         for k in 0..grid.depth.len() {
             let (body, subject) = (is_body(k), is_subject(k));
             area += u32::from(body || subject);
-            let near = subject && body && image.depth[k] > grid.depth[k] + settings.apart;
+            let near = subject && body && image.depth[k] > grid.depth[k] + apart;
             uncovered += u32::from(near || subject && self.to_body[k] > seam);
             if body {
                 let bone = usize::from(model.bones[image.index[k] as usize]);
                 let part = &mut parts[model.parts[bone]];
-                part.free += u32::from(self.is_free(grid, k, image.depth[k], limits));
+                part.free += u32::from(self.is_free(grid, k, image.depth[k], seam, apart));
                 part.unknown += u32::from(grid.labels[k] == Label::Unknown);
                 part.all += 1;
             }
@@ -129,8 +117,7 @@ impl AgreementScratch {
 
     /// True when a body surface at depth `z` stands in cell `k` before a farther reading, or where the background was
     /// removed.
-    fn is_free(&self, grid: &OrganisedCloud, k: usize, z: f32, limits: FreeLimits) -> bool {
-        let FreeLimits { seam, apart } = limits;
+    fn is_free(&self, grid: &OrganisedCloud, k: usize, z: f32, seam: u16, apart: f32) -> bool {
         match grid.labels[k] {
             Label::Unknown => false,
             Label::Person => z < grid.depth[k] - apart,

@@ -81,7 +81,6 @@ pub(crate) fn for_each_point(
         metric: SurfaceMetric {
             point_to_point,
             point_to_plane: config.point_to_plane,
-            normals: config.normals,
             robust: config.robust,
             sigma,
             pull_length: config.registration.pull_length,

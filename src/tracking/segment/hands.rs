@@ -49,7 +49,7 @@ pub(super) fn find_hands(cloud: &OrganisedCloud, body: &BodyComponents<'_>) -> V
         .iter()
         .filter_map(|c| {
             let centre = P3::from(c.centre());
-            let end = cloud.cell_of(&centre)?;
+            let end: [i32; 2] = cloud.cell_of(&centre)?.into();
             let near = |k: &&usize| (cloud.centre(**k) - centre).norm() <= body.settings.arm_length;
             cells
                 .iter()
@@ -60,9 +60,9 @@ pub(super) fn find_hands(cloud: &OrganisedCloud, body: &BodyComponents<'_>) -> V
         .collect()
 }
 
-fn cell_position(cloud: &OrganisedCloud, cell: usize) -> (i32, i32) {
+fn cell_position(cloud: &OrganisedCloud, cell: usize) -> [i32; 2] {
     let columns = cloud.size().0;
-    ((cell % columns) as i32, (cell / columns) as i32)
+    [(cell % columns) as i32, (cell / columns) as i32]
 }
 
 /// Groups of small components at the depth of the body; fingers are components of their own.
@@ -125,11 +125,10 @@ fn is_joined_by_hole(
     cloud: &OrganisedCloud,
     body: &BodyComponents<'_>,
     candidate: &Candidate,
-    from: (i32, i32),
-    to: (i32, i32),
+    [u, v]: [i32; 2],
+    [to_u, to_v]: [i32; 2],
 ) -> bool {
-    let (u, v) = from;
-    let (du, dv) = (to.0 - u, to.1 - v);
+    let (du, dv) = (to_u - u, to_v - v);
     let steps = du.abs().max(dv.abs());
     let (mut empty, mut between) = (0, 0);
     for s in 1..steps {

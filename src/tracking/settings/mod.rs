@@ -17,7 +17,7 @@ pub use fit::{
 };
 pub use model::ModelSettings;
 pub use recover::{HiddenLimbSettings, RecoverSettings, RepairSettings};
-pub use registration::{Association, FloorSettings, RegistrationSettings, SurfaceNormals};
+pub use registration::{Association, FloorSettings, RegistrationSettings};
 pub use segment::{
     ExpectedBodySettings, ExtremitySettings, HandSettings, PersonSettings, PlaneSettings,
     RefusalSettings, SegmentSettings,

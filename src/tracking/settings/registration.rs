@@ -66,14 +66,3 @@ pub enum Association {
     /// Exact nearest neighbours in space by kd-tree, both ways (the paper's choice, from the model to the data).
     KdTree,
 }
-
-/// Direction of the point-to-plane distance.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum SurfaceNormals {
-    /// The model's normal.
-    Model,
-    /// The mean of the model's and the reading's normal (symmetric metric of Rusinkiewicz 2019).
-    #[default]
-    Symmetric,
-}

@@ -3,7 +3,7 @@
 use super::settings;
 use super::{
     AssessSettings, Association, FitSettings, ModelSettings, RecoverSettings, RegistrationSettings,
-    SegmentSettings, ShapeSettings, StartSettings, StepSettings, SurfaceNormals,
+    SegmentSettings, ShapeSettings, StartSettings, StepSettings,
 };
 
 settings! {
@@ -21,10 +21,8 @@ settings! {
         pub stride: Option<u32> = None,
         /// Weight of point-to-point beside point-to-plane: without it limbs along the view creep, more slows them.
         pub point_to_point: f64 = 0.05,
-        /// Weight of point-to-plane.
+        /// Weight of point-to-plane, along the mean of both normals.
         pub point_to_plane: f64 = 1.0,
-        /// Direction of point-to-plane.
-        pub normals: SurfaceNormals = SurfaceNormals::Symmetric,
         /// Weight pairs by the Geman–McClure kernel.
         pub robust: bool = true,
         /// Use pairs found from the readings' side too.

@@ -44,6 +44,16 @@ struct LimbAim {
     twist: f64,
 }
 
+impl LimbAim {
+    fn new(direction: Vector3<f64>, bend: f64, twist: f64) -> Self {
+        Self {
+            direction,
+            bend,
+            twist,
+        }
+    }
+}
+
 /// A hypothesis of an arm.
 struct ArmPose {
     cost: f64,
@@ -79,17 +89,8 @@ impl<'a> Hypotheses<'a> {
         }
         for direction in self.upper_arms(pose, arm, side) {
             for bend in settings.bends {
-                let hypothesis = self.aimed_arm(
-                    pose,
-                    side,
-                    LimbAim {
-                        direction,
-                        bend,
-                        twist: 0.0,
-                    },
-                    scratch,
-                );
-                all.push(hypothesis);
+                let aim = LimbAim::new(direction, bend, 0.0);
+                all.push(self.aimed_arm(pose, side, aim, scratch));
             }
         }
         all.sort_by(|a, b| a.cost.total_cmp(&b.cost));
@@ -102,16 +103,8 @@ impl<'a> Hypotheses<'a> {
         for direction in finalists {
             for bend in settings.more_bends {
                 for twist in settings.twists {
-                    all.push(self.aimed_arm(
-                        pose,
-                        side,
-                        LimbAim {
-                            direction,
-                            bend,
-                            twist,
-                        },
-                        scratch,
-                    ));
+                    let aim = LimbAim::new(direction, bend, twist);
+                    all.push(self.aimed_arm(pose, side, aim, scratch));
                 }
             }
         }
@@ -137,15 +130,7 @@ impl<'a> Hypotheses<'a> {
             hypotheses.push(bent);
             for &direction in &directions {
                 for twist in settings.leg_twists {
-                    hypotheses.push(self.aimed(
-                        pose,
-                        leg,
-                        &LimbAim {
-                            direction,
-                            bend,
-                            twist,
-                        },
-                    ));
+                    hypotheses.push(self.aimed(pose, leg, &LimbAim::new(direction, bend, twist)));
                 }
             }
         }
@@ -193,15 +178,11 @@ impl<'a> Hypotheses<'a> {
             }
             None => pose.clone(),
         };
-        let LimbAim {
-            direction,
-            bend,
-            twist,
-        } = aim;
-        let effort = settings.bend_cost * bend * bend + settings.twist_cost * twist * twist;
+        let effort =
+            settings.bend_cost * aim.bend * aim.bend + settings.twist_cost * aim.twist * aim.twist;
         ArmPose {
             cost: self.cost(&pose, scratch) + effort,
-            direction: (twist == 0.0).then_some(direction),
+            direction: (aim.twist == 0.0).then_some(aim.direction),
             pose,
         }
     }
@@ -327,15 +308,7 @@ pub(crate) fn resting_limb(
     let now = misplaced(pose);
     let aimed = all.map(|(d, bend)| {
         let direction = Vector3::new(d[0] * sign, d[1], d[2]).normalize();
-        hypotheses.aimed(
-            pose,
-            limb,
-            &LimbAim {
-                direction,
-                bend,
-                twist: 0.0,
-            },
-        )
+        hypotheses.aimed(pose, limb, &LimbAim::new(direction, bend, 0.0))
     });
     let rated = aimed.map(|pose| (misplaced(&pose), pose));
     let least = rated.min_by_key(|(points, _)| *points);

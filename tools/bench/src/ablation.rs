@@ -7,8 +7,8 @@ use std::sync::Arc;
 use tryon_body::{Template, embedded};
 use tryon_geometry::camera::NoiseModel;
 use tryon_synth::{Actor, Room, Sequence, Setting};
+use tryon_tracking::TrackerConfig;
 use tryon_tracking::registration::Association;
-use tryon_tracking::{SurfaceNormals, TrackerConfig};
 
 /// Size of a measurement.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -94,9 +94,6 @@ pub fn variants() -> Vec<Variant> {
     add("association", "kd-tree, one way", &|c| c.both_ways = false);
     add("metric", "symmetric + 0.05 point", &|_| {});
     add("metric", "symmetric", &|c| c.point_to_point = 0.0);
-    add("metric", "plane + 0.05 point", &|c| {
-        c.normals = SurfaceNormals::Model
-    });
     add("metric", "point", &|c| {
         (c.point_to_point, c.point_to_plane) = (1.0, 0.0)
     });

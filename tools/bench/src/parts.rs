@@ -6,7 +6,8 @@ use tryon_geometry::math::order_statistics::{median, percentile};
 use tryon_synth::labelled::{LabelledFrame, LabelledFrames, NO_CLASS};
 use tryon_tracking::part_classes::{PART_CLASSES, PartKind, class_name, kind_of};
 use tryon_tracking::segment::part_forest::{PartForest, PartScratch};
-use tryon_tracking::{JointProposals, ProposalSettings, facing};
+use tryon_tracking::settings::ProposalSettings;
+use tryon_tracking::{JointProposals, facing};
 
 /// A proposal within this distance of its anchor counts, metres.
 pub const WITHIN: f64 = 0.10;

@@ -14,9 +14,8 @@ use tryon_tracking::segment::part_forest::{PartForest, PartScratch, PersonCells}
 use tryon_tracking::segment::{
     PersonChoice, ScenePlanes, SegmentScratch, find_person, find_planes,
 };
-use tryon_tracking::{
-    JointProposals, PartClasses, ProposalSettings, SegmentSettings, facing, yaw_of_trunk,
-};
+use tryon_tracking::settings::{ProposalSettings, SegmentSettings};
+use tryon_tracking::{JointProposals, PartClasses, facing, yaw_of_trunk};
 
 /// Joints of the recordings (lower case, without their side) and the kind whose anchor they are.
 const NAMES: [(&str, PartKind); 8] = [

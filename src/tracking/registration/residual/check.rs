@@ -1,8 +1,7 @@
 //! Finite-difference checks of residuals on a small posed chain.
 
 use super::{
-    EdgeResidual, LimbMotion, PointTerm, Residual, RowTerm, SurfaceMetric, SurfaceNormals,
-    SurfaceResidual,
+    EdgeResidual, LimbMotion, PointTerm, Residual, RowTerm, SurfaceMetric, SurfaceResidual,
 };
 use crate::registration::{Dof, ModelPoints, NormalEquations, Pair, ROOT_UNKNOWNS, is_ancestor};
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
@@ -192,7 +191,6 @@ impl Scan {
     pub(super) fn surface(
         &self,
         model: &ModelPoints<'_>,
-        normals: SurfaceNormals,
         robust: bool,
         weight: f64,
         visit: &mut dyn FnMut(&PointTerm),
@@ -211,7 +209,6 @@ impl Scan {
             metric: SurfaceMetric {
                 point_to_point: 0.1 * weight,
                 point_to_plane: weight,
-                normals,
                 robust,
                 sigma: 0.05,
                 pull_length: 0.12,

@@ -51,6 +51,15 @@ pub struct FloorResidual<'a> {
     pub settings: FloorSettings,
 }
 
+/// Row of the residual: distance `off` along `along` of `joint`, relative to the joint `from` where there is one, metres.
+struct FloorRow {
+    joint: usize,
+    from: Option<usize>,
+    off: Vector3<f64>,
+    along: Vector3<f64>,
+    weight: f64,
+}
+
 /// True for a joint whose cell has a reading of anything: it follows readings instead of the floor.
 pub fn is_in_view(grid: &OrganisedCloud, joint: &P3d) -> bool {
     let home = grid
@@ -70,26 +79,22 @@ impl FloorResidual<'_> {
         }
     }
 
-    /// Visits one row: `off` along `along` for `joint`, relative to the joint `from` where there is one.
-    fn row(
-        &self,
-        (joint, from): (usize, Option<usize>),
-        off: &Vector3<f64>,
-        along: &Vector3<f64>,
-        weight: f64,
-        visit: &mut impl FnMut(&RowTerm<'_>),
-    ) {
+    /// Visits one row.
+    fn row(&self, row: &FloorRow, visit: &mut impl FnMut(&RowTerm<'_>)) {
+        let along = row.along;
         let slope = |&k: &usize| {
             let dof = &self.dofs[ROOT_UNKNOWNS + k];
-            let base = from.map_or_else(Vector3::zeros, |f| self.velocity(f, dof));
-            along.dot(&(self.velocity(joint, dof) - base)) * self.unseen[k]
+            let base = row
+                .from
+                .map_or_else(Vector3::zeros, |f| self.velocity(f, dof));
+            along.dot(&(self.velocity(row.joint, dof) - base)) * self.unseen[k]
         };
         let slopes: Vec<f64> = self.foot.angles.iter().map(slope).collect();
         visit(&RowTerm {
             angles: &self.foot.angles,
             slopes: &slopes,
-            residual: along.dot(off),
-            weight,
+            residual: along.dot(&row.off),
+            weight: row.weight,
         });
     }
 }
@@ -117,7 +122,14 @@ impl Residual for FloorResidual<'_> {
             };
             let kernel = self.settings.kernel * self.settings.kernel;
             let weight = weight * (kernel / (kernel + off * off)).powi(2);
-            self.row((joint, None), &(up * off), &up, weight, &mut visit);
+            let rise = FloorRow {
+                joint,
+                from: None,
+                off: up * off,
+                along: up,
+                weight,
+            };
+            self.row(&rise, &mut visit);
             let Some([kept_ankle, kept_ball]) = self.planted else {
                 continue;
             };
@@ -129,7 +141,14 @@ impl Residual for FloorResidual<'_> {
                 (Some(ankle), kept - now, self.settings.direction)
             };
             for along in [across, up.cross(&across)] {
-                self.row((joint, from), &off, &along, weight, &mut visit);
+                let slide = FloorRow {
+                    joint,
+                    from,
+                    off,
+                    along,
+                    weight,
+                };
+                self.row(&slide, &mut visit);
             }
         }
     }

@@ -11,7 +11,6 @@ pub(crate) mod prior;
 pub(crate) mod surface;
 mod term;
 
-pub use crate::settings::SurfaceNormals;
 pub use clearance::ClearanceResidual;
 pub use edge::EdgeResidual;
 pub use floor::{FloorPlane, FloorResidual, FootChain, is_in_view};

@@ -2,7 +2,6 @@
 
 use super::{PointTerm, Residual};
 use crate::registration::{GemanMcClure, Metric, ModelPoints, Pair};
-use crate::settings::SurfaceNormals;
 use tryon_geometry::spatial::OrganisedCloud;
 
 /// Metric and robust kernel of paired points.
@@ -10,10 +9,9 @@ use tryon_geometry::spatial::OrganisedCloud;
 pub struct SurfaceMetric {
     /// Weight of point-to-point.
     pub point_to_point: f64,
-    /// Weight of point-to-plane.
+    /// Weight of point-to-plane, along the mean of the model's and the reading's normal (symmetric metric of Rusinkiewicz
+    /// 2019).
     pub point_to_plane: f64,
-    /// Direction of point-to-plane.
-    pub normals: SurfaceNormals,
     /// Weight pairs by the Geman–McClure kernel instead of 1.
     pub robust: bool,
     /// Width of the kernel, metres.
@@ -47,11 +45,9 @@ impl Residual for SurfaceResidual<'_> {
             let i = pair.model as usize;
             let p = self.model.positions[i].coords.cast::<f64>();
             let r = self.grid.points[pair.cell as usize].coords.cast::<f64>() - p;
-            let mut direction = self.model.normals[i].cast::<f64>();
-            if self.metric.normals == SurfaceNormals::Symmetric {
-                let both = direction + self.grid.normals[pair.cell as usize].cast::<f64>();
-                direction = both.try_normalize(f64::EPSILON).unwrap_or(direction);
-            }
+            let normal = self.model.normals[i].cast::<f64>();
+            let both = normal + self.grid.normals[pair.cell as usize].cast::<f64>();
+            let direction = both.try_normalize(f64::EPSILON).unwrap_or(normal);
             let sigma = self.metric.sigma;
             let kernel = GemanMcClure {
                 sigma: if r.norm() > self.metric.pull_length {
@@ -84,17 +80,14 @@ impl Residual for SurfaceResidual<'_> {
 
 #[cfg(test)]
 mod tests {
-    use super::*;
     use crate::registration::residual::check::Scan;
 
     #[test]
     fn derivatives_match_finite_differences() {
-        for normals in [SurfaceNormals::Model, SurfaceNormals::Symmetric] {
-            for robust in [false, true] {
-                Scan::check_points(|scan, model, weight, visit| {
-                    scan.surface(model, normals, robust, weight, visit);
-                });
-            }
+        for robust in [false, true] {
+            Scan::check_points(|scan, model, weight, visit| {
+                scan.surface(model, robust, weight, visit);
+            });
         }
     }
 }
