@@ -5,12 +5,13 @@ use super::settings;
 settings! {
     /// Settings of the assessment.
     pub struct AssessSettings {
-        /// Width of a seam along outlines that counts for neither side, metres: loose clothes and a body of not quite the right
-        /// shape. Larger hides thin limbs.
+        /// Width of a seam along outlines that counts for neither side, metres: loose clothes and a body of not quite the
+        /// right shape. Larger hides thin limbs.
         pub seam: f32 = 0.035,
         /// Least width of the seam, cells: outlines are that coarse.
         pub least_seam: u16 = 2,
         /// Difference in depth above which body and reading are different surfaces, metres: thick clothes stay below.
+        /// Smaller counts thick clothes as wrong.
         pub apart: f32 = 0.10,
         /// Confidence of the joints.
         pub confidence: ConfidenceSettings = ConfidenceSettings::default(),
@@ -22,7 +23,7 @@ settings! {
 
     /// Settings of the joints' confidence.
     pub struct ConfidenceSettings {
-        /// Readings of a bone at which its confidence is half of the most.
+        /// Readings of a bone at which its confidence is half of the most. Larger doubts thin limbs.
         pub half_sure: f32 = 4.0,
         /// Information below which a degree of freedom is ambiguous, per point, m²/rad²: a twentieth of a shank in view.
         pub ambiguous: f64 = 3e-5,
@@ -33,14 +34,17 @@ settings! {
         /// Factor on the confidence of a joint at its limit.
         pub at_limit_factor: f32 = 0.8,
         /// Share of a body part in free space from which its joints say so: outlines of well tracked limbs reach 0.2.
+        /// Smaller doubts limbs in loose clothes.
         pub free: f32 = 0.25,
-        /// Depth behind the drawn model from which a model point is occluded by it, metres.
+        /// Depth behind the drawn model from which a model point is occluded by it, metres. Larger takes occluded bones for
+        /// ones without return.
         pub hidden: f32 = 0.05,
     }
 
     /// Settings of the sequential test for a person.
     pub struct BeliefSettings {
-        /// Difference in depth up to which a reading covers the drawn body, metres: thick clothes stay below.
+        /// Difference in depth up to which a reading covers the drawn body, metres: thick clothes stay below. Larger takes a
+        /// wall behind for the body.
         pub covered: f32 = 0.10,
         /// Least cells of a head that decide on it; fewer are a head out of the image.
         pub least_head: f32 = 10.0,
@@ -53,34 +57,34 @@ settings! {
         pub start_weights: [f32; 3] = [17.6, 8.05, 18.4],
         /// Log odds of a start at zero, from the same regression.
         pub start_bias: f32 = -32.4,
-        /// Log odds of a followed person per unit of agreement, similarity and covered head. Who was found whole may be hidden in
-        /// part later: matched points say nothing any more.
+        /// Log odds of a followed person per unit of agreement, similarity and covered head. Who was found whole may be
+        /// hidden in part later: matched points say nothing any more.
         pub weights: [f32; 3] = [8.8, 20.0, 14.7],
         /// Log odds of a followed person at zero.
         pub bias: f32 = -25.25,
-        /// Summed log odds from which a subject is a person. Larger starts later; the most likely of 205 starts of things had 2.6,
-        /// and things lose matched points in the next frame.
+        /// Summed log odds from which a subject is a person. Larger starts later; the most likely of 205 starts of things
+        /// had 2.6, and things lose matched points in the next frame.
         pub sure: f32 = 3.0,
         /// Least log odds that earlier refusals leave: a mannequin that is taken away lets a person stand in its place.
         pub most_doubt: f32 = -6.0,
-        /// Most frames in which a start may become sure.
+        /// Most frames in which a start may become sure. Larger follows things for longer.
         pub longest: u32 = 15,
         /// Weight of a new frame in the running log odds of a person. Larger loses one who hides the head for a moment.
         pub newest: f32 = 0.3,
-        /// Running log odds below which a subject no longer is a person.
+        /// Running log odds below which a subject no longer is a person. Larger loses who bends down.
         pub keep: f32 = -0.5,
     }
 
     /// Settings of the seat.
     pub struct SeatSettings {
-        /// Length of the heel behind the ankle, metres: the end of what feet can bear.
+        /// Length of the heel behind the ankle, metres: the end of what feet can bear. Larger seats who crouches later.
         pub heel: f64 = 0.05,
-        /// Distance of the centre of mass behind the heels from which a seat bears the body, metres. Seated people have 0.15 to
-        /// 0.25; those who crouch or bend down keep it over their feet, less the errors of tracked legs.
+        /// Distance of the centre of mass behind the heels from which a seat bears the body, metres. Seated people have 0.15
+        /// to 0.25; those who crouch or bend down keep it over their feet, less the errors of tracked legs.
         pub behind: f64 = 0.10,
-        /// Cosine to the vertical below which a thigh is raised: more than 45° forward.
+        /// Cosine to the vertical below which a thigh is raised: more than 45° forward. Larger seats who takes a step.
         pub raised: f64 = 0.7,
-        /// Frames in a row after which another posture counts; the first one counts at once.
+        /// Frames in a row after which another posture counts; the first one counts at once. Smaller flickers.
         pub steady: u32 = 5,
     }
 }

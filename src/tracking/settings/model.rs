@@ -5,7 +5,8 @@ use super::settings;
 settings! {
     /// Settings of the model.
     pub struct ModelSettings {
-        /// Share of the way from wrist to fingertip that stands for a hand: readings of one half in its sleeve are the fingers.
+        /// Share of the way from wrist to fingertip that stands for a hand: readings of one half in its sleeve are the
+        /// fingers.
         pub hand: f64 = 0.7,
         /// Share of the way from ankle to toes that stands for a foot that hangs or points at the camera.
         pub foot: f64 = 0.5,

@@ -9,7 +9,8 @@ settings! {
         /// Depth behind the drawn surface up to which a model point counts as visible (relaxed visibility), metres. Larger:
         /// occluded limbs pair with what covers them; smaller: noise hides points.
         pub relaxed_visibility: f32 = 0.05,
-        /// Cosine between normal and view ray below which a model point is grazing and takes no pair: its reading is unreliable.
+        /// Cosine between normal and view ray below which a model point is grazing and takes no pair: its reading is
+        /// unreliable.
         pub least_facing: f32 = 0.1,
         /// Least depth that sizes a search window, metres; bounds the window of points at the lens.
         pub nearest_depth: f32 = 0.1,
@@ -29,12 +30,14 @@ settings! {
         pub outline_step: f32 = 0.06,
         /// Least width of the robust kernel on edges, metres: a point in free space may be far off its outline.
         pub edge_sigma: f64 = 0.10,
-        /// Length beyond which a pair is a pull towards an unexplained reading, metres, and that pair's least kernel width, so that
-        /// the pull is no outlier; at most the longest pair of a first iteration.
+        /// Length beyond which a pair is a pull towards an unexplained reading, metres, and that pair's least kernel width,
+        /// so that the pull is no outlier; at most the longest pair of a first iteration.
         pub pull_length: f64 = 0.12,
-        /// Smallest cosine between normals of a pair (Table 1: 60°).
+        /// Smallest cosine between normals of a pair (Table 1: 60°). Larger loses edges of limbs, smaller pairs front with
+        /// back.
         pub cos_normal: f32 = 0.5,
-        /// Displacement since its last query up to which a point keeps its reading, metres: a fifth of a cell. 0 queries always.
+        /// Displacement since its last query up to which a point keeps its reading, metres: a fifth of a cell. 0 queries
+        /// always.
         pub reuse: f32 = 2e-3,
         /// Floor residual.
         pub floor: FloorSettings = FloorSettings::default(),
@@ -42,11 +45,11 @@ settings! {
 
     /// Settings of the floor residual; weights are per point of a frame.
     pub struct FloorSettings {
-        /// Weight of the height of a standing joint. It decides against a knee without readings (2·10⁻⁵ per squared radian at a
-        /// lever of 40 cm); a seen knee takes no part.
+        /// Weight of the height of a standing joint. It decides against a knee without readings (2·10⁻⁵ per squared radian
+        /// at a lever of 40 cm); a seen knee takes no part.
         pub height: f64 = 1e-2,
-        /// The same for a planted foot: smaller, as an estimated floor is off by 1 to 2 cm, which an almost straight leg turns
-        /// into a decimetre of the foot (docs/decisions).
+        /// The same for a planted foot: smaller, as an estimated floor is off by 1 to 2 cm, which an almost straight leg
+        /// turns into a decimetre of the foot (docs/decisions).
         pub planted_height: f64 = 2e-3,
         /// Weight of the horizontal place of a planted ankle.
         pub place: f64 = 1e-3,

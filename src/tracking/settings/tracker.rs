@@ -50,13 +50,13 @@ settings! {
         pub calm: f64 = 0.75,
         /// Skip coarse iterations where the prediction explains its frame as well as the last pose did.
         pub skip_coarse: bool = true,
-        /// Reuse the last report while the depth image changes only by noise and the subject is at rest or absent; every sixth
-        /// frame is processed in any case.
+        /// Reuse the last report while the depth image changes only by noise and the subject is at rest or absent; every
+        /// sixth frame is processed in any case.
         pub skip_unchanged: bool = true,
         /// Factor on the rest-pose prior: 0 loses 0.3 mm.
         pub rest_weight: f64 = 0.5,
-        /// Damping per point (λᵣ of eq. 12): metres² for the root's translation, radians² for angles. Flat from 10⁻⁵ to 10⁻⁴,
-        /// 10⁻³ loses 2 mm.
+        /// Damping per point (λᵣ of eq. 12): metres² for the root's translation, radians² for angles. Flat from 10⁻⁵ to
+        /// 10⁻⁴, 10⁻³ loses 2 mm.
         pub damping: f64 = 1e-4,
         /// Largest depth of a reading, metres: the range of the sensors.
         pub farthest: f32 = 8.0,
