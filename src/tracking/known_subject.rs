@@ -10,7 +10,6 @@ use super::subject::{StepLog, SubjectFrame};
 use super::workspace::Workspace;
 use crate::model::TrackerModel;
 use crate::shape::{KnownBody, Probation, SizeEstimate};
-use crate::start::outline;
 
 impl TrackerState {
     /// Goes on with a body that was measured before, as soon as somebody is found whom it fits; false for a state that has
@@ -91,15 +90,7 @@ impl SubjectFrame<'_> {
     fn has_other_height(&self, state: &TrackerState, workspace: &mut Workspace) -> bool {
         let settings = &self.model.config.shape;
         let up = self.up.cast();
-        let floor = state.world_from_camera.iso().translation.vector.y;
-        let floor = state.floor_known.then_some(floor);
-        let seen = outline(
-            &self.observation,
-            &up,
-            self.person.cut_below,
-            floor,
-            &self.model.config,
-        );
+        let seen = self.outline(state);
         let seen = seen.filter(|_| !self.person.cut_below);
         let Some(seen) = seen.and_then(|o| o.stature) else {
             return false;

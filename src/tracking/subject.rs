@@ -19,7 +19,7 @@ use crate::segment::PersonSearch;
 use crate::segment::part_forest::PartScratch;
 use crate::settings::{Schedule, StepSettings};
 use crate::shape::{SizeCalibration, SizeEstimate, first_shapes};
-use crate::start::{BodyProposals, StartPrior, initial_pose, outline, person_cells};
+use crate::start::{BodyProposals, Outline, StartPrior, initial_pose, outline, person_cells};
 use nalgebra::Vector3;
 use tryon_body::parts::BodyPart;
 use tryon_body::{BodyShape, BoneTransforms, Pose};
@@ -261,16 +261,7 @@ impl SubjectFrame<'_> {
         if state.pose_age > settings.forget {
             state.reset(self.model);
         }
-        let camera_height = state.world_from_camera.iso().translation.vector.y;
-        let floor = state.floor_known.then_some(camera_height);
-        let up = self.up.cast();
-        let outline = outline(
-            &self.observation,
-            &up,
-            self.person.cut_below,
-            floor,
-            &self.model.config,
-        );
+        let outline = self.outline(state);
         let is_unknown = state.size.frames == 0 && self.model.config.adapt_size;
         let stature = outline.and_then(|o| o.stature).filter(|_| is_unknown);
         let shapes = first_shapes(self.model, stature, &state.shape);
@@ -300,6 +291,14 @@ impl SubjectFrame<'_> {
             pose,
             is_fine: false,
         })
+    }
+
+    /// Landmarks of the subject's silhouette.
+    pub(super) fn outline(&self, state: &TrackerState) -> Option<Outline> {
+        let camera_height = state.world_from_camera.iso().translation.vector.y;
+        let floor = state.floor_known.then_some(camera_height);
+        let (up, config) = (self.up.cast(), &self.model.config);
+        outline(&self.observation, &up, self.person.cut_below, floor, config)
     }
 
     /// Proposals of the part forest for this frame.

@@ -58,12 +58,8 @@ pub(crate) fn predict(
         return Prediction { pose, is_fine };
     };
     let ahead = time_ns.saturating_sub(recent.time_ns) as f64 / recent.interval_ns as f64;
-    let mut moved = extrapolate(
-        skeleton,
-        before,
-        pose,
-        settings.damping * ahead.min(settings.longest),
-    );
+    let ratio = settings.damping * ahead.min(settings.longest);
+    let mut moved = extrapolate(skeleton, before, pose, ratio);
     moved.clamp_to_limits(skeleton);
     let report = fit(&moved);
     let is_fine = motion(skeleton, pose, &moved) < settings.slow && is_as_good(&report);

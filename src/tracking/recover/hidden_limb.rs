@@ -10,7 +10,7 @@ use tryon_body::{BoneTransforms, Pose};
 use tryon_geometry::math::P3;
 use tryon_geometry::spatial::Label;
 
-/// Step of the finite differences and bound of an angle's step, radians.
+/// Step of the finite differences, radians: larger is off by the limb's curvature, smaller by rounding.
 const STEP: f64 = 1e-4;
 /// Points of a limb: middle of the upper bone, hinge, middle of the lower bone, end, hand or foot.
 const POINTS: usize = 5;

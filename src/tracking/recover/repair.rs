@@ -103,12 +103,8 @@ impl Repair<'_> {
         if self.is_stuck
             && let Some(pose) = self.out_of_the_air(scratch)
         {
-            let kept = self.fitted(
-                pose,
-                bound(settings.no_dearer, settings.agrees),
-                scratch,
-                measure,
-            );
+            let bound = bound(settings.no_dearer, settings.agrees);
+            let kept = self.fitted(pose, bound, scratch, measure);
             if kept.is_some() {
                 return kept;
             }
@@ -119,12 +115,9 @@ impl Repair<'_> {
             .into_iter();
         let rated = candidates.map(|pose| (self.cost(&pose, scratch), pose));
         let (_, pose) = rated.min_by(|a, b| a.0.total_cmp(&b.0))?;
-        let share = if self.is_contradicted {
-            1.0
-        } else {
-            settings.agrees
-        };
-        self.fitted(pose, bound(settings.cheaper, share), scratch, measure)
+        let share = (!self.is_contradicted).then_some(settings.agrees);
+        let bound = bound(settings.cheaper, share.unwrap_or(1.0));
+        self.fitted(pose, bound, scratch, measure)
     }
 
     /// A pose after a fit, if it stays within the bound.

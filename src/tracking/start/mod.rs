@@ -12,5 +12,5 @@ pub(crate) use body_proposals::{BodyProposals, person_cells};
 pub use facing::{Facing, facing, yaw_of_joints, yaw_of_trunk};
 pub(crate) use gravity::rolled_camera;
 pub(crate) use hypotheses::resting_limb;
-pub(crate) use initial_pose::{StartPrior, initial_pose, outline};
+pub(crate) use initial_pose::{Outline, StartPrior, initial_pose, outline};
 pub use joint_proposals::{JointProposals, ProposedAnchor};
