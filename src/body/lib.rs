@@ -12,11 +12,13 @@
 //! - The embedded figure: [`mod@embedded`], read by [`mod@template_file`].
 //! - Tape measures: [`mod@measure::tape`].
 //! - Arms turned out of the trunk, for the easy pose of the first drape: [`mod@arm_clearance`].
+//! - Points bound to the skin: [`mod@skin_binding`].
 //! - A skeleton for a bare scan: [`mod@rig`], `src/dressing/rig_standing.rs`.
 //!
 //! Garments from scans:
 //!
 //! - Pose blend shapes (eq. 1, 2): [`mod@pose_shapes`], [`mod@pose_offsets`].
+//! - Unposing (eq. 8): [`mod@skin_binding::posed_skin`].
 #![allow(rustdoc::private_intra_doc_links)] // the index of ideas names private modules
 
 mod arm_clearance;
@@ -36,6 +38,7 @@ mod rig;
 mod shape;
 mod shape_space;
 mod skeleton;
+pub mod skin_binding;
 mod skin_weights;
 mod skinning;
 mod template;
@@ -50,6 +53,7 @@ pub use rig::rig;
 pub use shape::{BodyShape, RestBody};
 pub use shape_space::ShapeSpace;
 pub use skeleton::{Joint, JointMotion, Skeleton};
+pub use skin_binding::{PosedSkin, SkinBinding, SkinSearch};
 pub use skin_weights::SkinWeights;
 pub use skinning::{MovedRest, skin, skin_moved};
 pub use template::Template;

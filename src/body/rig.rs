@@ -1,15 +1,15 @@
 //! Rigging of a bare mesh: joints and skinning weights from a template that has been fitted to it.
 
 use super::{
-    BodyError, BoneTransforms, Joint, JointMotion, RestBody, Skeleton, SkinWeights, Template,
+    BodyError, BoneTransforms, Joint, JointMotion, RestBody, Skeleton, SkinSearch, SkinWeights,
+    Template,
 };
 use nalgebra::Vector3;
 use std::f64::consts::PI;
-use tryon_geometry::math::P3;
+use tryon_geometry::math::{P3, V3};
 use tryon_geometry::mesh::smoothing::mean;
-use tryon_geometry::mesh::{Face, Topology, TriMesh, vertex_normals};
+use tryon_geometry::mesh::{Topology, TriMesh, vertex_normals};
 use tryon_geometry::par::Par;
-use tryon_geometry::spatial::PointTree;
 
 /// Template vertices further than this from a mesh vertex lend it no weights, metres. A template on the mesh is within
 /// 5 cm even where hair or shoes stand off.
@@ -75,31 +75,21 @@ fn nearest_weights(
     template: &Template,
     fitted: &RestBody,
 ) -> Result<Vec<Vec<f64>>, BodyError> {
-    let shifted = |vertices: &[P3], faces: &[Face], topology: &Topology| -> Vec<P3> {
-        let mut normals = Vec::new();
-        let around = topology.vertex_faces();
-        vertex_normals(Par::Seq, vertices, faces, around, &mut normals);
-        let pairs = vertices.iter().zip(&normals);
-        pairs.map(|(p, n)| p + n * (REACH * SHIFT)).collect()
-    };
-    let faces = template.mesh().faces();
-    let tree = PointTree::new(&shifted(&fitted.vertices, faces, template.topology()));
-    let (w, joints) = (template.weights(), template.skeleton().len());
-    let row = |(vertex, p): (usize, &P3)| {
-        let Some((near, _)) = tree.nearest(p, REACH) else {
+    let skin = SkinSearch::new(template, &fitted.vertices, REACH * SHIFT);
+    let mut normals = Vec::new();
+    let (vertices, around) = (mesh.vertices(), topology.vertex_faces());
+    vertex_normals(Par::Seq, vertices, mesh.faces(), around, &mut normals);
+    let row = |(vertex, (p, normal)): (usize, (&P3, &V3))| {
+        let Some((near, _)) = skin.nearest(p, normal, REACH) else {
             return Err(BodyError::Vertex {
                 vertex,
                 why: "no part of the fitted template is near it".into(),
             });
         };
-        let mut row = vec![0.0; joints];
-        for (j, weight) in w.joints[near].iter().zip(w.weights[near]) {
-            row[usize::from(*j)] += f64::from(weight);
-        }
-        Ok(row)
+        let row = template.weights().row(near, template.skeleton().len());
+        Ok(row.into_iter().map(f64::from).collect())
     };
-    let points = shifted(mesh.vertices(), mesh.faces(), topology);
-    points.iter().enumerate().map(row).collect()
+    vertices.iter().zip(&normals).enumerate().map(row).collect()
 }
 
 /// Motion of a joint after a turn of its bone by `q`.

@@ -4,8 +4,6 @@ use super::Template;
 use nalgebra::{Point3, Vector3};
 use serde::{Deserialize, Serialize};
 use tryon_geometry::math::{P3, V3};
-use tryon_geometry::mesh::vertex_normals;
-use tryon_geometry::par::Par;
 
 /// Shape of a subject relative to the template. Default: the template itself.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -37,14 +35,7 @@ impl Template {
     pub fn personalise(&self, shape: &BodyShape) -> RestBody {
         let all: Vec<u32> = (0..self.mesh().vertices().len() as u32).collect();
         let (mut vertices, joints) = self.personalise_some(shape, &all);
-        let mut normals = Vec::new();
-        vertex_normals(
-            Par::Rayon,
-            &vertices,
-            self.mesh().faces(),
-            self.topology().vertex_faces(),
-            &mut normals,
-        );
+        let normals = self.normals(&vertices);
         let base = vertices.clone();
         for (p, (n, &d)) in vertices
             .iter_mut()

@@ -40,6 +40,14 @@ impl SkinWeights {
         }
         Ok(out)
     }
+    /// Weights of all of so many joints at a vertex.
+    pub fn row(&self, vertex: usize, joints: usize) -> Vec<f32> {
+        let mut row = vec![0.0; joints];
+        for (j, w) in self.joints[vertex].iter().zip(self.weights[vertex]) {
+            row[usize::from(*j)] += w;
+        }
+        row
+    }
     /// The joint with the largest weight, b(i) of the paper.
     pub fn dominant(&self, vertex: usize) -> usize {
         usize::from(self.joints[vertex][0])

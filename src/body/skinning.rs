@@ -2,9 +2,18 @@
 
 use super::{BoneTransforms, Pose, RestBody, SkinWeights, Template};
 use tryon_geometry::math::{P3, V3};
+use tryon_geometry::mesh::vertex_normals;
 use tryon_geometry::par::{self, Par};
 
 impl Template {
+    /// Unit vertex normals of the skin with vertices elsewhere, shape `[vertices]`.
+    pub fn normals(&self, vertices: &[P3]) -> Vec<V3> {
+        let (faces, around) = (self.mesh().faces(), self.topology().vertex_faces());
+        let mut out = Vec::new();
+        vertex_normals(Par::Rayon, vertices, faces, around, &mut out);
+        out
+    }
+
     /// Skins a `rest` body in a pose, frame of the pose, metres, shape `[vertices]`; `bones` become those of the pose.
     pub fn skin_pose<F>(
         &self,

@@ -4,9 +4,8 @@ use tryon_body::import::template_from_smpl;
 use tryon_body::parts::{BodyPart, BodySegment};
 use tryon_body::{BodyError, BoneTransforms, Pose, RestBody, Template, skin};
 use tryon_formats::npz::{SmplArrays, regress};
-use tryon_geometry::math::{Body, P3, Rigid, V3};
+use tryon_geometry::math::{Body, P3, Rigid};
 use tryon_geometry::mesh::smoothing::smoothed;
-use tryon_geometry::mesh::vertex_normals;
 use tryon_geometry::par::Par;
 
 /// A round belly: a bulge of the front of the trunk.
@@ -274,10 +273,8 @@ fn cover(template: &Template, covering: Covering) -> Vec<P3> {
     for _ in 0..SMOOTHING {
         depth = smoothed(Par::Seq, around, &depth);
     }
-    let mut normals: Vec<V3> = Vec::new();
-    let faces = template.topology().vertex_faces();
-    let mesh = template.mesh();
-    vertex_normals(Par::Seq, mesh.vertices(), mesh.faces(), faces, &mut normals);
-    let moved = mesh.vertices().iter().zip(&normals).zip(&depth);
+    let vertices = template.mesh().vertices();
+    let normals = template.normals(vertices);
+    let moved = vertices.iter().zip(&normals).zip(&depth);
     moved.map(|((p, n), d)| p + n * *d).collect()
 }

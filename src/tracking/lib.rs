@@ -37,6 +37,7 @@
 //! - Constant-velocity start: [`mod@fit::prediction`].
 //! - Poses from proposals: [`mod@start::body_proposals`].
 //! - Repairs: [`mod@recover::repair`].
+//! - The person in a still, from virtual cameras around it: [`mod@still`].
 //! - Hidden feet: [`mod@fit::standing`].
 //! - Arms that no reading shows: [`mod@recover::hidden_limb`].
 //! - Sleeves without return: [`mod@fit::hand_assignment`].
@@ -74,6 +75,7 @@ mod start;
 mod state;
 mod status;
 mod step;
+pub mod still;
 mod subject;
 #[cfg(test)]
 mod test_scene;

@@ -44,6 +44,11 @@ impl Csr {
         let both = |[a, b]: &[u32; 2]| [(*a, *b), (*b, *a)];
         Self::from_pairs(rows, &edges.iter().flat_map(both).collect::<Vec<_>>())
     }
+    /// Faces around each of `rows` vertices, ascending.
+    pub fn of_faces(rows: usize, faces: &[Face]) -> Self {
+        let corners = (0..).zip(faces).flat_map(|(k, f)| f.map(|v| (v, k)));
+        Self::from_pairs(rows, &corners.collect::<Vec<_>>())
+    }
     /// Connected rows whose neighbours are `alike`, each depth-first from its first row, in the order of their first rows.
     pub fn components(&self, alike: impl Fn(usize, usize) -> bool) -> Vec<Vec<u32>> {
         let mut is_taken = vec![false; self.rows()];
@@ -137,16 +142,10 @@ impl Topology {
         }
         let edges: Vec<Edge> = edges.into_values().map(|(_, e)| e).collect();
         let n = mesh.vertices().len();
-        let vf: Vec<(u32, u32)> = mesh
-            .faces()
-            .iter()
-            .enumerate()
-            .flat_map(|(fi, f)| f.map(|v| (v, fi as u32)))
-            .collect();
         let ends: Vec<[u32; 2]> = edges.iter().map(|e| e.v).collect();
         Ok(Self {
             edges,
-            vertex_faces: Csr::from_pairs(n, &vf),
+            vertex_faces: Csr::of_faces(n, mesh.faces()),
             vertex_neighbours: Csr::of_edges(n, &ends),
         })
     }

@@ -4,8 +4,8 @@
 //! eight triangles whose boxes are tested together (one wide register).
 
 use super::triangle::{closest_on_triangle, ray_crossing};
-use crate::math::{P3, V3d};
-use crate::mesh::Face;
+use crate::math::{P3, V3, V3d};
+use crate::mesh::{Face, face_normal};
 use wide::f32x8;
 
 /// Triangles of a leaf: the lanes of a wide register.
@@ -322,6 +322,11 @@ impl Bvh {
 
     fn corners(&self, face: u32, x: &[P3]) -> [P3; 3] {
         self.faces[face as usize].map(|v| x[v as usize])
+    }
+
+    /// Unit normal of a triangle; `None` for one without area.
+    pub fn unit_normal(&self, x: &[P3], face: u32) -> Option<V3> {
+        face_normal(x, &self.faces[face as usize]).try_normalize(f32::MIN_POSITIVE)
     }
 
     /// Winding number of the surface around `p`, by the crossings of a ray along +z: 0 outside, 1 inside, 2 where two

@@ -8,6 +8,7 @@ pub(crate) mod intersections;
 mod kdtree;
 pub(crate) mod organised;
 mod triangle;
+pub(crate) mod warm_query;
 
 pub use brute::nearest_brute_force;
 pub use bvh::{Bvh, Position, SurfacePoint};
@@ -17,3 +18,4 @@ pub use intersections::{Intersection, SelfIntersections, intersections};
 pub use kdtree::PointTree;
 pub use organised::{Label, OrganisedCloud};
 pub use triangle::closest_on_triangle;
+pub use warm_query::WarmQuery;

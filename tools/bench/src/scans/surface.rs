@@ -191,11 +191,7 @@ impl SceneSurface {
 
 /// Unit vertex normals.
 fn normals(vertices: &[P3], faces: &[Face]) -> Vec<V3> {
-    let pairs: Vec<(u32, u32)> = (0..)
-        .zip(faces)
-        .flat_map(|(face, corners)| corners.map(|v| (v, face)))
-        .collect();
-    let around = Csr::from_pairs(vertices.len(), &pairs);
+    let around = Csr::of_faces(vertices.len(), faces);
     let mut out = Vec::new();
     vertex_normals(Par::Rayon, vertices, faces, &around, &mut out);
     out
