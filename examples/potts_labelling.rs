@@ -7,8 +7,8 @@ use std::f64::consts::TAU;
 use std::path::Path;
 use std::time::Instant;
 use std::{env, fs, io};
-use tryon::clothcap::mrf::{AlphaExpansion, ExpansionConfig, MrfError, MrfModel};
 use tryon::geometry::math::order_statistics::median;
+use tryon::geometry::mrf::{AlphaExpansion, ExpansionConfig, MrfError, MrfModel};
 
 /// Vertices along and around the tube: 13,000 nodes, 38,800 edges.
 const RINGS: usize = 130;

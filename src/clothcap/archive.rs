@@ -5,12 +5,11 @@ use super::capture::{FrameCapture, FrameReport};
 pub use super::capture_header::CaptureHeader;
 use super::capture_header::{check_body, check_header};
 use super::texture::GarmentTexture;
-use super::unpose::unpose_shaped;
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use tryon_body::Template;
+use tryon_body::{PosedSkin, Template};
 use tryon_formats::FormatError;
 use tryon_formats::image::{read_color, write_png_rgb};
 use tryon_formats::npy::{read_npy, write_npy};
@@ -51,7 +50,7 @@ impl FrameDisplacements {
     pub fn of(template: &Template, frame: &FrameCapture) -> Self {
         let undressed = &frame.undressed;
         let all = 0..undressed.vertices.len();
-        let rest = unpose_shaped(template, &undressed.bones, all, &undressed.vertices);
+        let rest = PosedSkin::new(template, &undressed.bones).unpose(all, &undressed.vertices);
         let shape = template.personalise(&undressed.body.shape).vertices;
         Self {
             body: rest.iter().zip(&shape).map(|(a, b)| a - b).collect(),

@@ -13,8 +13,6 @@ use std::f32::consts::TAU;
 use tryon_body::Template;
 use tryon_geometry::math::V3;
 use tryon_geometry::math::order_statistics::median;
-use tryon_geometry::mesh::vertex_normals;
-use tryon_geometry::par::Par;
 
 /// Azimuths at which the gain is known, 15° apart.
 const AZIMUTHS: usize = 24;
@@ -83,9 +81,7 @@ struct Directions {
 
 impl Directions {
     fn of(alignment: &Alignment, template: &Template) -> Self {
-        let (faces, around) = (template.mesh().faces(), template.topology().vertex_faces());
-        let mut normals = Vec::new();
-        vertex_normals(Par::Rayon, &alignment.model, faces, around, &mut normals);
+        let normals = template.normals(&alignment.model);
         let azimuth = |n: &V3| n.x.atan2(n.z).rem_euclid(TAU) / TAU * AZIMUTHS as f32;
         Self {
             azimuths: normals.iter().map(azimuth).collect(),

@@ -17,10 +17,9 @@ use super::topology::ClothTemplate;
 use super::undress::{
     ShapeScan, Undressed, Undresser, WornGarments, minimally_clothed, posed_under_cloth,
 };
-use super::unpose::unpose_shaped;
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
-use tryon_body::{BodyShape, Template};
+use tryon_body::{BodyShape, PosedSkin, Template};
 use tryon_geometry::math::{P3, V3};
 
 /// Mean robust distance of a scan from the body model above which it says nothing of the subject's shape, metres.
@@ -358,12 +357,8 @@ fn displacements(
     undressed: &Undressed,
 ) -> Vec<Vec<V3>> {
     let all = 0..undressed.vertices.len();
-    let body = surface.extend(&unpose_shaped(
-        surface.body(),
-        &undressed.bones,
-        all,
-        &undressed.vertices,
-    ));
+    let skin = PosedSkin::new(surface.body(), &undressed.bones);
+    let body = surface.extend(&skin.unpose(all, &undressed.vertices));
     let parts = cloth.parts.iter().zip(garments);
     parts
         .map(|(part, vertices)| {

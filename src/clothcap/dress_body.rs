@@ -4,10 +4,10 @@ use super::CaptureError;
 use super::archive::FrameDisplacements;
 use super::layers::clear_body;
 use super::multi::MultiCloth;
-use super::retarget::{PenetrationSolver, RetargetReport, SolidBody, on_body, pose_part};
+use super::retarget::{PenetrationSolver, RetargetReport, SolidBody, on_body};
 use super::topology::ClothTemplate;
 use std::sync::Arc;
-use tryon_body::{ArmClearance, BoneTransforms, Pose, RestBody, Template};
+use tryon_body::{ArmClearance, BoneTransforms, Pose, PosedSkin, RestBody, Template};
 use tryon_geometry::math::{P3, V3, World};
 use tryon_geometry::par::Par;
 
@@ -109,10 +109,13 @@ impl<'a> BodyDresser<'a> {
         self.template
             .pose_vertices(Par::Rayon, &rest, &bones, &mut body);
         self.solid.place(&body)?;
-        let (rest, template) = (self.surface.extend(&rest), self.surface.template());
+        let rest = self.surface.extend(&rest);
+        let skin = PosedSkin::new(self.surface.template(), &bones);
         let parts = self.cloth.parts.iter().zip(&displacements.garments);
-        let posed =
-            parts.map(|(part, d)| pose_part(part, template, &bones, &on_body(part, d, &rest)));
+        let posed = parts.map(|(part, d)| {
+            let nodes = part.nodes.iter().map(|v| *v as usize);
+            skin.pose(nodes, &on_body(part, d, &rest))
+        });
         let mut garments: Vec<Vec<P3>> = posed.collect();
         let reports = clear_body(self.cloth, &mut self.solvers, &self.solid, &mut garments)?;
         Ok(DressedPose {

@@ -6,22 +6,22 @@
 //! - From one camera: key frames [`mod@turn::key_frames`], points of a frame [`mod@turn::frame_points`], one pose for
 //!   all [`mod@turn::fused_cloud`], joint registration [`mod@turn::multi_view`].
 //! - What no scan point shows: [`mod@segment::unseen`].
-//! - Start from virtual depth cameras: [`mod@align::start`], [`mod@virtual_camera`].
+//! - Start from virtual depth cameras: [`mod@align::start`], [`mod@virtual_camera`], [`tryon_tracking::still`].
 //! - Body model to scan (eq. 3, 6, 7): [`mod@align::model_fit`].
+//! - A surface pulled to points, the same for the fits below: [`mod@align::surface_fit`], its linear system
+//!   [`mod@align::quadratic`], its pairs [`mod@align::scan_pairing`].
 //! - Free surface (eq. 4, 5): [`mod@align::free_surface`].
-//! - Their linear system: [`mod@align::quadratic`].
-//! - Kept faces of its points: [`mod@align::face_cache`].
 //! - Sequences (eq. 9, 10): [`mod@align::aligner`].
 //! - Surfaces of skirts and dresses: [`mod@topology`].
 //! - Told from trousers in [`mod@align::legs`].
-//! - Unposing (eq. 8): [`mod@unpose`].
+//! - Unposing (eq. 8): [`tryon_body::PosedSkin`].
 //! - Colours (eq. 13): [`mod@segment::color_mixture`].
 //! - Prior (figure 4): [`mod@segment::prior`].
 //! - Labels (eq. 11, 12): [`mod@segment::labelling`].
 //! - Number and kinds of garments: [`mod@segment::outfit`].
 //! - Two on the torso: [`mod@segment::torso`].
 //! - Labels of the scan: [`mod@segment::scan_labels`].
-//! - Alpha expansion, maximum flow (eq. 14): [`mod@mrf::expansion`], [`mod@mrf::max_flow`].
+//! - Alpha expansion, maximum flow (eq. 14): [`mod@tryon_geometry::mrf`].
 //! - Parts and rings: [`mod@multi::part`].
 //! - Their fit (eq. 15 to 21): [`mod@multi::part_fit`].
 //! - One shape from several scans (section 5.4): [`mod@align::shared_shape`], [`mod@align::body_equations`].
@@ -47,7 +47,6 @@ mod dress_body;
 mod error;
 mod floor;
 mod layers;
-pub mod mrf;
 pub mod multi;
 mod part_colors;
 mod part_fitter;
@@ -66,7 +65,6 @@ pub mod texture;
 pub mod topology;
 pub mod turn;
 mod undress;
-mod unpose;
 mod virtual_camera;
 
 pub use capture::{CaptureConfig, FrameCapture, FrameReport, OutfitCapture};
@@ -76,4 +74,3 @@ pub use error::CaptureError;
 pub use population::population;
 pub use segmenter::{ScanSegmenter, SegmentedScan};
 pub use undress::{Undressed, minimal_shape};
-pub use unpose::{blended, unpose, unpose_shaped};

@@ -5,13 +5,11 @@ use super::align::{AlignedBody, QueryCounts, SETTLED, STILL, VertexCounts};
 use super::captured_outfit::CapturedOutfit;
 use super::multi::{ClothPart, MultiCloth, PartFit, PartFitConfig, PartScan};
 use super::part_colors::part_colors;
-use super::retarget::pose_part;
 use super::scan::BodyScan;
 use super::segmenter::SegmentedScan;
 use super::texture::TextureAtlas;
 use super::topology::ClothTemplate;
-use super::unpose::unpose_shaped;
-use tryon_body::BoneTransforms;
+use tryon_body::{BoneTransforms, PosedSkin};
 use tryon_geometry::math::P3;
 
 /// Side of a texel over the distance between the scan's colours, and its limits, metres.
@@ -117,8 +115,9 @@ impl<'a> PartFitter<'a> {
     pub(super) fn later(&mut self, outfit: &CapturedOutfit) -> Result<FittedParts, CaptureError> {
         let mut fitted = FittedParts::default();
         let bones = &self.segmented.alignment.bones;
+        let skin = PosedSkin::new(self.cloth.template(), bones);
         for (part, rest) in outfit.cloth.parts.iter().zip(&outfit.rest) {
-            let model = pose_part(part, self.cloth.template(), bones, rest);
+            let model = skin.pose(part.nodes.iter().map(|v| *v as usize), rest);
             self.fit(part, &model, model.clone(), &mut fitted)?;
         }
         Ok(fitted)
@@ -147,10 +146,10 @@ impl<'a> PartFitter<'a> {
         }
         let report = self.fits[k].run(&points, model, &mut vertices, &self.config)?;
         out.vertices.push(vertices);
-        out.errors.push(report.error);
+        out.errors.push(report.surface.error);
         out.boundary_errors.push(report.boundary_error);
-        out.queries += report.queries;
-        out.vertex_counts += report.vertices;
+        out.queries += report.surface.queries;
+        out.vertex_counts += report.surface.vertices;
         Ok(())
     }
 }
@@ -172,5 +171,5 @@ pub(super) fn rest(
     posed: &[P3],
 ) -> Vec<P3> {
     let nodes = part.nodes.iter().map(|v| *v as usize);
-    unpose_shaped(cloth.template(), bones, nodes, posed)
+    PosedSkin::new(cloth.template(), bones).unpose(nodes, posed)
 }

@@ -1,15 +1,13 @@
 //! Retargeting (eq. 23 to 25): captured cloth as displacements from the body, on new bodies in any pose, free of penetration.
 
 use super::CaptureError;
-use super::align::{QuadraticEnergy, Stencil};
+use super::align::{Pull, PullPlace, SurfaceFit, SurfaceTerms};
 use super::multi::ClothPart;
-use super::unpose::blended;
 use serde::{Deserialize, Serialize};
-use tryon_body::{BoneTransforms, Template};
+use tryon_body::Template;
 use tryon_cloth::contact::{ClosestPoint, CollisionBody, CollisionModel, CollisionWorkspace, Part};
 use tryon_cloth::{Config, collision_model};
 use tryon_geometry::math::{P3, V3};
-use tryon_geometry::mesh::edges;
 use tryon_geometry::par::{self, Par};
 use tryon_geometry::spatial::Bvh;
 
@@ -43,26 +41,6 @@ pub struct RetargetReport {
 pub fn on_body(part: &ClothPart, displacements: &[V3], body: &[P3]) -> Vec<P3> {
     let below = part.nodes.iter().map(|v| body[*v as usize]);
     below.zip(displacements).map(|(p, d)| p + d).collect()
-}
-
-/// Posed vertices of a garment, with pose blend shapes and skinning of its template's vertices.
-pub fn pose_part(
-    part: &ClothPart,
-    template: &Template,
-    bones: &BoneTransforms,
-    rest: &[P3],
-) -> Vec<P3> {
-    let nodes = part.nodes.iter().map(|v| *v as usize);
-    let offsets = template.pose_offsets(bones);
-    let shaped = |v: usize, p: &P3| offsets.as_ref().map_or(*p, |o| p + o.of(v)).cast();
-    let weights = template.weights();
-    nodes
-        .zip(rest)
-        .map(|(v, p)| {
-            let blend = blended(weights, bones, v);
-            blend.transform_point(&shaped(v, p)).cast()
-        })
-        .collect()
 }
 
 /// Body that garments stay outside of: its pressing parts and bent joints apart, as it is drawn.
@@ -167,71 +145,16 @@ fn fault(e: impl std::fmt::Display) -> CaptureError {
     }
 }
 
-/// System that moves one garment out of bodies.
+/// Vertices of a garment next to bodies.
 #[derive(Debug)]
-pub struct PenetrationSolver {
+struct InnerSide {
     /// Body vertex next to each vertex.
     below: Vec<u32>,
     /// Vertices under another garment, which are placed below it afterwards.
     hidden: Vec<bool>,
-    edges: Vec<[u32; 2]>,
-    energy: QuadraticEnergy,
 }
 
-impl PenetrationSolver {
-    /// Prepares the system of a garment.
-    ///
-    /// # Errors
-    /// [`CaptureError::Solve`] for a garment too large.
-    pub fn new(part: &ClothPart) -> Result<Self, CaptureError> {
-        let edges = edges(&part.faces);
-        let stencils = edges.iter().map(|e| Stencil::edge(*e, 1.0)).collect();
-        Ok(Self {
-            energy: QuadraticEnergy::new(part.nodes.len(), stencils, &[])?,
-            below: part.below.clone(),
-            hidden: part.hidden.clone(),
-            edges,
-        })
-    }
-
-    /// Moves vertices out of the body with the least change of edges; afterwards none is inside unless the report says so.
-    /// The result is a fixed point: run again, nothing moves.
-    ///
-    /// # Errors
-    /// [`CaptureError::Solve`].
-    pub fn run(
-        &mut self,
-        body: &SolidBody,
-        vertices: &mut Vec<P3>,
-    ) -> Result<RetargetReport, CaptureError> {
-        let inside_before = count(&self.inside(body, vertices));
-        let mut report = RetargetReport {
-            inside_before,
-            ..RetargetReport::default()
-        };
-        let mut pushed: Vec<Option<P3>> = vec![None; vertices.len()];
-        let is_near = self.push((body, LEAST - ROUNDING), vertices, &mut pushed);
-        if !is_near && inside_before == 0 {
-            return Ok(report);
-        }
-        let wanted = vertices.clone();
-        for _ in 0..ROUNDS[0] {
-            if !self.push((body, LEAST), vertices, &mut pushed) {
-                break;
-            }
-            *vertices = self.relax(&wanted, &pushed)?;
-            report.solves += 1;
-        }
-        self.project(body, vertices);
-        let inside = self.inside(body, vertices);
-        self.gather(body, vertices, inside);
-        self.push_out(body, vertices);
-        report.inside = count(&self.inside(body, vertices));
-        let moved = vertices.iter().zip(&wanted).map(|(a, b)| (a - b).norm());
-        report.largest_push = moved.fold(0.0, f32::max);
-        Ok(report)
-    }
-
+impl InnerSide {
     /// Moves what smoothing left inside or too near, each vertex by itself.
     fn project(&self, body: &SolidBody, vertices: &mut [P3]) {
         for _ in 0..ROUNDS[1] {
@@ -265,32 +188,6 @@ impl PenetrationSolver {
         inside
     }
 
-    /// Moves vertices that are still inside towards neighbours outside: in a fold of the skin, where pushing out of one side
-    /// is pushing into the other, cloth bunches up.
-    pub(super) fn gather(&self, body: &SolidBody, vertices: &mut [P3], mut inside: Vec<bool>) {
-        /// Shares of the way that are tried.
-        const WAY: [f32; 4] = [0.25, 0.5, 0.75, 1.0];
-        loop {
-            let before = count(&inside);
-            for &[a, b] in &self.edges {
-                for [v, w] in [[a, b], [b, a]].map(|e| e.map(|v| v as usize)) {
-                    if !inside[v] || inside[w] {
-                        continue;
-                    }
-                    let way = vertices[w] - vertices[v];
-                    let tried: Vec<P3> = WAY.iter().map(|t| vertices[v] + way * *t).collect();
-                    let free = body.contains(&tried).iter().position(|b| !b);
-                    if let Some(k) = free {
-                        (vertices[v], inside[v]) = (tried[k], false);
-                    }
-                }
-            }
-            if count(&inside) == before {
-                break;
-            }
-        }
-    }
-
     /// Targets of vertices nearer than a distance; true if there is any.
     fn push(
         &self,
@@ -310,21 +207,108 @@ impl PenetrationSolver {
         }
         any
     }
+}
 
-    /// Vertices with the wanted edges, through the pushed places.
-    fn relax(&mut self, wanted: &[P3], pushed: &[Option<P3>]) -> Result<Vec<P3>, CaptureError> {
-        self.energy.reset();
-        for (k, e) in self.edges.iter().enumerate() {
-            let d = (wanted[e[0] as usize] - wanted[e[1] as usize]).cast::<f64>();
-            self.energy.add_stencil(k, 1.0, d.into());
+/// System that moves one garment out of bodies.
+#[derive(Debug)]
+pub struct PenetrationSolver {
+    side: InnerSide,
+    fit: SurfaceFit,
+}
+
+impl PenetrationSolver {
+    /// Prepares the system of a garment.
+    ///
+    /// # Errors
+    /// [`CaptureError::Solve`] for a garment too large.
+    pub fn new(part: &ClothPart) -> Result<Self, CaptureError> {
+        let n = part.nodes.len();
+        Ok(Self {
+            fit: SurfaceFit::new("retargeting", n, &part.faces, |_| 1.0, Vec::new())?,
+            side: InnerSide {
+                below: part.below.clone(),
+                hidden: part.hidden.clone(),
+            },
+        })
+    }
+
+    /// Moves vertices out of the body with the least change of edges; afterwards none is inside unless the report says so.
+    /// The result is a fixed point: run again, nothing moves.
+    ///
+    /// # Errors
+    /// [`CaptureError::Solve`].
+    pub fn run(
+        &mut self,
+        body: &SolidBody,
+        vertices: &mut Vec<P3>,
+    ) -> Result<RetargetReport, CaptureError> {
+        let side = &self.side;
+        let inside_before = count(&side.inside(body, vertices));
+        let mut report = RetargetReport {
+            inside_before,
+            ..RetargetReport::default()
+        };
+        let mut pushed: Vec<Option<P3>> = vec![None; vertices.len()];
+        let is_near = side.push((body, LEAST - ROUNDING), vertices, &mut pushed);
+        if !is_near && inside_before == 0 {
+            return Ok(report);
         }
-        for (v, (p, push)) in wanted.iter().zip(pushed).enumerate() {
-            self.energy.add_vertex(v as u32, ANCHOR, p);
-            if let Some(q) = push {
-                self.energy.add_vertex(v as u32, PUSH, q);
+        let wanted = vertices.clone();
+        let terms = SurfaceTerms {
+            model: &wanted,
+            coupling: 1.0,
+            smoothness: &[],
+            anchor: ANCHOR,
+            iterations: ROUNDS[0],
+            converged: 0.0,
+            still: 0.0,
+        };
+        let fitted = self.fit.run(&terms, vertices, |x| {
+            let pull = |(v, target): (u32, &Option<P3>)| {
+                Some(Pull {
+                    at: PullPlace::Vertex(v),
+                    weight: PUSH,
+                    target: (*target)?,
+                })
+            };
+            let any = side.push((body, LEAST), x, &mut pushed);
+            Ok(any.then(|| (0..).zip(&pushed).filter_map(pull).collect()))
+        })?;
+        report.solves = fitted.iterations;
+        side.project(body, vertices);
+        let inside = side.inside(body, vertices);
+        self.gather(body, vertices, inside);
+        self.side.push_out(body, vertices);
+        report.inside = count(&self.side.inside(body, vertices));
+        let moved = vertices.iter().zip(&wanted).map(|(a, b)| (a - b).norm());
+        report.largest_push = moved.fold(0.0, f32::max);
+        Ok(report)
+    }
+
+    /// Moves vertices that are still inside towards neighbours outside: in a fold of the skin, where pushing out of one side
+    /// is pushing into the other, cloth bunches up.
+    pub(super) fn gather(&self, body: &SolidBody, vertices: &mut [P3], mut inside: Vec<bool>) {
+        /// Shares of the way that are tried.
+        const WAY: [f32; 4] = [0.25, 0.5, 0.75, 1.0];
+        loop {
+            let before = count(&inside);
+            for &[a, b] in self.fit.edges() {
+                for [v, w] in [[a, b], [b, a]].map(|e| e.map(|v| v as usize)) {
+                    if !inside[v] || inside[w] {
+                        continue;
+                    }
+                    let way = vertices[w] - vertices[v];
+                    let tried: Vec<P3> = WAY.iter().map(|t| vertices[v] + way * *t).collect();
+                    let free = body.contains(&tried).iter().position(|b| !b);
+                    if let Some(k) = free {
+                        (vertices[v], inside[v]) = (tried[k], false);
+                    }
+                }
+            }
+            if count(&inside) == before {
+                break;
             }
         }
-        self.energy.minimise("retargeting")
     }
 }
 

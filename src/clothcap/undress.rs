@@ -2,8 +2,8 @@
 
 use super::CaptureError;
 use super::align::{
-    AlignedBody, EVEN_EDGE, FaceCache, FitStage, ModelFit, QuadraticEnergy, QueryPoints,
-    QuerySurface, SETTLED, Stencil, fit_shared_shape,
+    AlignedBody, EVEN_EDGE, FitStage, ModelFit, Pull, PullPlace, SETTLED, ScanPairing, ScanPoints,
+    SurfaceFit, SurfaceTerms, fit_shared_shape,
 };
 use super::multi::MultiCloth;
 use super::retarget::SolidBody;
@@ -11,10 +11,7 @@ use super::scan::BodyScan;
 use std::sync::Arc;
 use tryon_body::{BodyShape, BoneTransforms, Template};
 use tryon_geometry::math::P3;
-use tryon_geometry::mesh::face_normal;
 use tryon_geometry::par::{self, Par};
-use tryon_geometry::spatial::Bvh;
-use tryon_tracking::registration::GemanMcClure;
 
 /// Scan points in the fit of the shape.
 const SAMPLES: usize = 6000;
@@ -46,8 +43,6 @@ const POINTS: usize = 30_000;
 const ANCHOR: f64 = 0.02;
 /// Weight of a garment vertex that the body comes through, beside its area.
 const PUSH: f64 = 4.0;
-/// Smallest cosine between normals of a pair.
-const NORMALS: f32 = 0.2;
 
 /// Body under the cloth of one scan.
 #[derive(Clone, Debug)]
@@ -139,13 +134,35 @@ pub(super) struct WornGarments<'a> {
     pub(super) vertices: &'a [Vec<P3>],
 }
 
+impl WornGarments<'_> {
+    /// Pulls of a body below the garments that it comes through.
+    fn pushes(&self, solid: &SolidBody, weight: f64) -> Vec<Pull> {
+        let mut pushes = Vec::new();
+        for (part, own) in self.cloth.parts.iter().zip(self.vertices) {
+            let mut hits = Vec::new();
+            par::map_into(Par::Rayon, own.len(), 128, &mut hits, |i| {
+                let hit = solid.below(&own[i], part.below[i]);
+                (!part.hidden[i] && hit.signed_distance < MARGIN).then_some(hit)
+            });
+            pushes.extend(own.iter().zip(hits).filter_map(|(p, hit)| {
+                let hit = hit?;
+                Some(Pull {
+                    at: PullPlace::Face(hit.face, hit.weights),
+                    weight,
+                    target: p - hit.normal * MARGIN,
+                })
+            }));
+        }
+        pushes
+    }
+}
+
 /// Estimates bodies under the cloth of the scans of one subject.
 #[derive(Debug)]
 pub(super) struct Undresser {
     template: Arc<Template>,
-    energy: QuadraticEnergy,
-    edges: Vec<[u32; 2]>,
-    bvh: Bvh,
+    fit: SurfaceFit,
+    pairing: ScanPairing,
     solid: SolidBody,
 }
 
@@ -155,14 +172,12 @@ impl Undresser {
     /// # Errors
     /// [`CaptureError::Solve`] for a template too large.
     pub(super) fn new(template: Arc<Template>) -> Result<Self, CaptureError> {
-        let mesh = template.mesh();
-        let edges: Vec<[u32; 2]> = template.topology().edges().iter().map(|e| e.v).collect();
-        let stencils = edges.iter().map(|e| Stencil::edge(*e, EVEN_EDGE)).collect();
+        let (vertices, faces) = (template.mesh().vertices(), template.mesh().faces());
+        let stage = "body under cloth";
         Ok(Self {
-            energy: QuadraticEnergy::new(mesh.vertices().len(), stencils, mesh.faces())?,
-            bvh: Bvh::new(mesh.faces(), mesh.vertices()),
+            fit: SurfaceFit::new(stage, vertices.len(), faces, |_| EVEN_EDGE, Vec::new())?,
+            pairing: ScanPairing::new(faces, vertices, false),
             solid: SolidBody::new(&template)?,
-            edges,
             template,
         })
     }
@@ -179,102 +194,36 @@ impl Undresser {
         body: AlignedBody,
         skips: bool,
     ) -> Result<Undressed, CaptureError> {
-        let template = self.template.clone();
-        let (model, bones) = ModelFit::new(&template, scan, 1).posed(&body);
+        let (model, bones) = ModelFit::new(&self.template, scan, 1).posed(&body);
         let mut vertices = model.clone();
+        let area = self.template.mesh().area();
+        let vertex = area / model.len().max(1) as f64;
+        let points = ScanPoints {
+            left_out: covered,
+            ..ScanPoints::of(scan, scan.points.len().div_ceil(POINTS))
+        };
         let settled = if skips { SETTLED } else { 0.0 };
-        let mut cache = FaceCache::new(scan.points.len(), settled);
-        for _ in 0..ITERATIONS {
-            self.begin(&model);
-            self.add_skin((scan, covered), &vertices, &mut cache);
-            self.add_garments(garments, &vertices)?;
-            vertices = self.energy.minimise("body under cloth")?;
-        }
+        self.pairing.begin(scan.points.len(), settled);
+        let terms = SurfaceTerms {
+            model: &model,
+            coupling: COUPLING,
+            smoothness: &[],
+            anchor: ANCHOR * vertex,
+            iterations: ITERATIONS,
+            converged: 0.0,
+            still: 0.0,
+        };
+        self.fit.run(&terms, &mut vertices, |x| {
+            let matches = self.pairing.pair(&points, x, SIGMA);
+            let mut pulls: Vec<Pull> = points.pulls(&matches, area).collect();
+            self.solid.place_unseparated(x)?;
+            pulls.extend(garments.pushes(&self.solid, PUSH * vertex));
+            Ok(Some(pulls))
+        })?;
         Ok(Undressed {
             body,
             bones,
             vertices,
         })
-    }
-
-    fn area_of_vertex(&self) -> f64 {
-        let mesh = self.template.mesh();
-        mesh.area() / mesh.vertices().len().max(1) as f64
-    }
-
-    fn begin(&mut self, model: &[P3]) {
-        self.energy.reset();
-        for (k, e) in self.edges.iter().enumerate() {
-            let d = (model[e[0] as usize] - model[e[1] as usize]).cast::<f64>();
-            self.energy.add_stencil(k, COUPLING * COUPLING, d.into());
-        }
-        let anchor = ANCHOR * self.area_of_vertex();
-        for (v, p) in model.iter().enumerate() {
-            self.energy.add_vertex(v as u32, anchor, p);
-        }
-    }
-
-    /// Pulls the body to the visible skin.
-    fn add_skin(
-        &mut self,
-        (scan, covered): (&BodyScan, &[bool]),
-        vertices: &[P3],
-        cache: &mut FaceCache,
-    ) {
-        self.bvh.refit(vertices);
-        cache.advance(self.bvh.faces(), vertices);
-        let query = QuerySurface {
-            tree: &self.bvh,
-            vertices,
-            around: self.template.topology().vertex_faces(),
-        };
-        let stride = scan.points.len().div_ceil(POINTS).max(1);
-        let count = scan.points.len().div_ceil(stride);
-        let points = QueryPoints {
-            points: &scan.points,
-            normals: &scan.normals,
-            oriented: scan.oriented,
-            stride,
-            left_out: covered,
-        };
-        let kernel = GemanMcClure { sigma: SIGMA };
-        let point = self.template.mesh().area() / count.max(1) as f64;
-        for (i, of_scan, found) in cache.closest_each(&query, &points, NORMALS) {
-            let Some(at) = found else {
-                continue;
-            };
-            let own = face_normal(vertices, &self.bvh.faces()[at.face as usize]);
-            let unit = own.try_normalize(f32::MIN_POSITIVE);
-            if unit.is_some_and(|own| of_scan.agrees(&own, NORMALS)) {
-                let weight = point * kernel.weight(f64::from(at.distance * at.distance));
-                self.energy
-                    .add_face_point(at.face, at.weights, weight, &scan.points[i]);
-            }
-        }
-    }
-
-    /// Pushes the body below garments that it comes through.
-    fn add_garments(
-        &mut self,
-        garments: WornGarments<'_>,
-        vertices: &[P3],
-    ) -> Result<(), CaptureError> {
-        self.solid.place_unseparated(vertices)?;
-        let weight = PUSH * self.area_of_vertex();
-        for (part, own) in garments.cloth.parts.iter().zip(garments.vertices) {
-            let mut hits = Vec::new();
-            par::map_into(Par::Rayon, own.len(), 128, &mut hits, |i| {
-                let hit = self.solid.below(&own[i], part.below[i]);
-                (!part.hidden[i] && hit.signed_distance < MARGIN).then_some(hit)
-            });
-            for (p, hit) in own.iter().zip(hits) {
-                if let Some(hit) = hit {
-                    let target = p - hit.normal * MARGIN;
-                    self.energy
-                        .add_face_point(hit.face, hit.weights, weight, &target);
-                }
-            }
-        }
-        Ok(())
     }
 }

@@ -16,10 +16,11 @@
 //! - Disjoint sets: [`mod@mesh::union_find`].
 //! - Remeshing: [`mod@mesh::remesh`].
 //! - Sparse Cholesky, conjugate gradients: [`mod@linear::cholesky`], [`mod@linear::conjugate_gradient`].
-//! - Refit BVH, inside tests: [`mod@spatial::bvh`].
+//! - Refit BVH, inside tests: [`mod@spatial::bvh`]; closest points from the last ones: [`mod@spatial::warm_query`].
 //! - Self-intersections: [`mod@spatial::intersections`].
 //! - Depth image as a grid of points: [`mod@spatial::organised`].
 //! - Oracles: [`mod@spatial::brute`].
+//! - Graph cuts, alpha expansion: [`mod@mrf::max_flow`], [`mod@mrf::expansion`].
 //!
 //! Camera and files:
 //!
@@ -41,6 +42,7 @@ pub mod fixtures;
 pub mod linear;
 pub mod math;
 pub mod mesh;
+pub mod mrf;
 pub mod par;
 pub mod raster;
 pub mod spatial;

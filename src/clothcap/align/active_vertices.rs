@@ -4,7 +4,7 @@ use super::quadratic::QuadraticEnergy;
 use crate::CaptureError;
 use serde::{Deserialize, Serialize};
 use tryon_geometry::math::P3;
-use tryon_geometry::mesh::{Csr, Face};
+use tryon_geometry::mesh::Csr;
 
 /// Share of the vertices up to which they are solved apart. More are solved faster with all others, by factorisation.
 const SOME: f64 = 0.5;
@@ -57,20 +57,10 @@ impl<'a> ActiveVertices<'a> {
         }
     }
 
-    /// Begins a stage of other weights: all are active.
-    pub(crate) fn begin(&mut self) {
-        self.is_active.fill(true);
-    }
-
-    /// Takes the vertices that are pulled at in this iteration: corners of faces with points, and `others`.
-    pub(crate) fn see(
-        &mut self,
-        faces: impl Iterator<Item = Face>,
-        others: impl Iterator<Item = u32>,
-    ) {
+    /// Takes the vertices that are pulled at in this iteration.
+    pub(crate) fn see(&mut self, pulled: impl Iterator<Item = u32>) {
         self.is_seen.fill(false);
-        let all = faces.flatten().chain(others);
-        all.for_each(|v| self.is_seen[v as usize] = true);
+        pulled.for_each(|v| self.is_seen[v as usize] = true);
     }
 
     /// Moves the active vertices to the positions of least energy, metres; the mean motion of all.

@@ -2,19 +2,19 @@
 
 use super::active_vertices::VertexCounts;
 use super::arms::search_lost_arms;
-use super::face_cache::QueryCounts;
-use super::free_surface::{FreeSurface, SurfaceFitConfig, SurfaceMatch};
+use super::free_surface::{FreeSurface, SurfaceFitConfig};
 use super::legs::leg_topology;
 use super::model_fit::{AlignedBody, FitStage, ModelFit};
+use super::scan_pairing::{QueryCounts, SurfaceMatch};
 use super::start::{Start, find_person};
+use crate::CaptureError;
 use crate::scan::BodyScan;
 use crate::topology::{ClothTemplate, LegTopology};
-use crate::{CaptureError, unpose_shaped};
 use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
 use std::f64::consts::{FRAC_PI_2, PI};
 use std::sync::Arc;
-use tryon_body::{BoneTransforms, Pose, Template};
+use tryon_body::{BoneTransforms, Pose, PosedSkin, Template};
 use tryon_geometry::math::{P3, Rigid, World};
 
 /// BodyScan points in a fit of the model.
@@ -214,7 +214,7 @@ impl Aligner {
         let nodes = 0..out.surface.len();
         self.clothed = Some(ClothedTemplate {
             legs: self.cloth.legs(),
-            rest: unpose_shaped(&template, &out.bones, nodes, &out.surface),
+            rest: PosedSkin::new(&template, &out.bones).unpose(nodes, &out.surface),
             body: out.body.clone(),
         });
         Ok(Alignment {

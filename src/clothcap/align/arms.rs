@@ -3,12 +3,11 @@
 use super::model_fit::{AlignedBody, FitStage, ModelFit};
 use crate::CaptureError;
 use crate::scan::BodyScan;
-use crate::unpose::blended;
 use rand::{Rng, SeedableRng};
 use rand_distr::StandardNormal;
 use rand_pcg::Pcg32;
 use tryon_body::parts::BodyPart;
-use tryon_body::{BoneTransforms, RestBody, Template};
+use tryon_body::{BoneTransforms, PosedSkin, RestBody, Template};
 use tryon_geometry::math::P3;
 use tryon_geometry::spatial::PointTree;
 
@@ -131,8 +130,9 @@ impl<'a> ArmSearch<'a> {
         let mut bones = BoneTransforms::default();
         body.pose
             .bones(self.template.skeleton(), &self.rest, &mut bones);
+        let skin = PosedSkin::blended(self.template.weights(), &bones);
         let posed = |v: &usize| {
-            let blend = blended(self.template.weights(), &bones, *v);
+            let blend = skin.transform(*v);
             blend.transform_point(&self.rest.vertices[*v].cast()).cast()
         };
         self.nodes.iter().map(posed).collect()

@@ -7,8 +7,6 @@ use crate::topology::{ClothTemplate, LegTopology};
 use std::sync::Arc;
 use tryon_body::Template;
 use tryon_geometry::math::{P3, V3};
-use tryon_geometry::mesh::vertex_normals;
-use tryon_geometry::par::Par;
 
 /// Ways below the top of the tube that are looked at, metres: seats of trousers reach down to the first, the shortest
 /// skirts to the second.
@@ -45,13 +43,8 @@ pub(super) fn leg_topology(
 
 /// Share of the tube's middle, just below the crotch, in front of which the scan has cloth.
 fn seen_share(cloth: &ClothTemplate, scan: &BodyScan, surface: &[P3]) -> f64 {
-    let (mesh, around) = (
-        cloth.template().mesh(),
-        cloth.template().topology().vertex_faces(),
-    );
-    let mut normals = Vec::new();
-    vertex_normals(Par::Rayon, surface, mesh.faces(), around, &mut normals);
-    let rest = mesh.vertices();
+    let normals = cloth.template().normals(surface);
+    let rest = cloth.template().mesh().vertices();
     let top = cloth.middle().map(|v| rest[v].y).fold(f32::MIN, f32::max);
     let (mut seen, mut all) = (0, 0);
     for v in cloth

@@ -2,9 +2,8 @@
 
 use super::angle_priors::{angle_deviations, straight_precisions};
 use super::body_equations::BodyEquations;
-use super::face_walk::QuerySurface;
 use super::jacobian::{JacobianRows, Match};
-use super::pairing::ScanNormal;
+use super::scan_pairing::ScanNormal;
 use super::shape_unknowns::ShapeUnknowns;
 use crate::CaptureError;
 use crate::scalp::scalp;
@@ -16,7 +15,7 @@ use tryon_body::parts::BodySegment;
 use tryon_body::{BodyShape, BoneTransforms, MovedRest, Pose, RestBody, Template, skin_moved};
 use tryon_geometry::math::{P3, V3, World};
 use tryon_geometry::par::{self, Par};
-use tryon_geometry::spatial::Bvh;
+use tryon_geometry::spatial::{Bvh, WarmQuery};
 use tryon_tracking::registration::{GemanMcClure, apply, linearise};
 
 /// Standard deviation of a scan point from the body, metres, and number of independent ones: neighbours share the cloth
@@ -285,16 +284,17 @@ impl<'a> ModelFit<'a> {
 
     fn pair(&self, i: usize, kernel: &GemanMcClure) -> Option<Match> {
         let p = self.points[i];
-        let normal = ScanNormal {
+        let of_scan = ScanNormal {
             normal: self.normals[i],
             oriented: self.oriented,
         };
-        let surface = QuerySurface {
+        let surface = WarmQuery {
             tree: &self.bvh,
             vertices: &self.posed,
             around: self.template.topology().vertex_faces(),
         };
-        let (found, normal) = surface.closest_facing((&p, normal), self.near[i], NORMALS)?;
+        let (found, normal) =
+            surface.closest(&p, self.near[i], |own| of_scan.agrees(own, NORMALS))?;
         let face = self.bvh.faces()[found.face as usize];
         let mut residual = (p - found.point).cast::<f64>();
         let mut weight = kernel.weight(residual.norm_squared());

@@ -125,6 +125,11 @@ impl QuadraticEnergy {
         })
     }
 
+    /// Faces whose points can be pulled.
+    pub(crate) fn faces(&self) -> &[Face] {
+        &self.corners
+    }
+
     /// Empties the system.
     pub fn reset(&mut self) {
         self.values.fill(0.0);

@@ -3,19 +3,22 @@
 use super::model_fit::{AlignedBody, FitStage, ModelFit};
 use crate::CaptureError;
 use crate::scan::{BodyScan, ScanFrame};
-use crate::virtual_camera::{VirtualCamera, bounds};
+use crate::virtual_camera::{bounds, scan_frame};
 use std::f64::consts::FRAC_PI_2;
 use std::sync::Arc;
-use tryon_body::{Pose, Template};
+use tryon_body::Template;
 use tryon_formats::scan::ScanMesh;
-use tryon_geometry::math::{Body, Rigid, World};
-use tryon_tracking::{TrackerConfig, TrackerModel, TrackerState, Workspace, step};
+use tryon_tracking::TrackerConfig;
+use tryon_tracking::still::{StillSteps, VirtualCamera, find_still_person};
 
 /// Virtual cameras around the scan. With four, one sees the person within 45° of the front.
 const VIEWS: usize = 4;
-/// Frames that the tracker gets of one view: it finds the person in the first and measures the size in the others.
-const FRAMES: usize = 3;
-/// BodyScan points in the comparison of starts.
+/// Steps of the tracker on one view.
+const STEPS: StillSteps = StillSteps {
+    count: 3,
+    interval_ns: 33_000_000,
+};
+/// Scan points in the comparison of starts.
 const SAMPLES: usize = 1500;
 /// Mean robust distance above which a start explains no person, metres. Right starts had 16 to 27 mm.
 const WORST: f64 = 0.05;
@@ -114,24 +117,10 @@ fn tracked(
         displacements: false,
         ..TrackerConfig::default()
     };
-    let model = TrackerModel::new(template.clone(), camera.calibration.clone(), config);
-    let mut state = TrackerState::new(&model);
-    let mut workspace = Workspace::default();
-    let mut frame = camera.frame(scan);
-    for k in 0..FRAMES {
-        frame.sequence = k as u64;
-        frame.time_ns = k as u64 * 33_000_000;
-        step(&model, &mut state, &frame, &mut workspace).ok()?;
-    }
-    if !state.status.is_live() {
-        return None;
-    }
-    let root: Rigid<World, Body> = camera.world_from_camera * state.pose.root;
+    let frame = scan_frame(camera, scan);
+    let found = find_still_person(template, camera, &frame, config, STEPS).ok()??;
     Some(AlignedBody {
-        pose: Pose {
-            root,
-            angles: state.pose.angles.clone(),
-        },
-        shape: state.shape.clone(),
+        pose: found.pose,
+        shape: found.shape,
     })
 }

@@ -3,26 +3,18 @@
 use super::part::ClothPart;
 use crate::CaptureError;
 use crate::align::{
-    ActiveVertices, EVEN_EDGE, FaceCache, QuadraticEnergy, QueryCounts, QueryPoints, QuerySurface,
-    ScanNormal, Stencil, VertexCounts,
+    CONVERGED, EVEN_EDGE, Pull, PullPlace, ScanNormal, ScanPairing, ScanPoints, Stencil,
+    SurfaceFit, SurfaceFitReport, SurfaceTerms, explained,
 };
 use crate::scan::BodyScan;
-use std::sync::Arc;
 use tryon_geometry::math::{P3, V3};
 use tryon_geometry::mesh::{Csr, edges, face_normal};
-use tryon_geometry::spatial::{Bvh, PointTree, SurfacePoint};
-use tryon_tracking::registration::GemanMcClure;
+use tryon_geometry::spatial::PointTree;
 
-/// Smallest cosine between normals of a pair.
-const NORMALS: f32 = 0.2;
 /// Smallest cosine between normals of neighbours across a boundary.
 const BESIDE: f32 = 0.7;
 /// Pull to the start beside the data's: settles what no term determines.
 const ANCHOR: f64 = 1e-4;
-/// Mean motion of the vertices below which the fit ends, metres.
-const CONVERGED: f32 = 5e-5;
-/// Name of the solve in faults.
-const STAGE: &str = "garment part";
 /// Distance up to which a boundary point of the scan belongs to a ring, metres.
 const RING_REACH: f32 = 0.06;
 
@@ -68,26 +60,17 @@ impl Default for PartFitConfig {
 /// Report of a fit.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct PartFitReport {
-    /// Mean distance of the part's scan points from it, metres.
-    pub error: f64,
+    /// Fit to the part's points.
+    pub surface: SurfaceFitReport,
     /// Mean distance of the scan's boundary points from the rings, metres; 0 without any.
     pub boundary_error: f64,
-    /// BodyScan points with a partner.
-    pub paired: usize,
-    /// Solves.
-    pub iterations: usize,
-    /// Nearest-point queries.
-    pub queries: QueryCounts,
-    /// Vertices.
-    pub vertices: VertexCounts,
 }
 
-/// BodyScan points of one part.
+/// Scan points of one part.
 #[derive(Clone, Debug, Default)]
 pub struct PartScan {
-    points: Vec<P3>,
-    normals: Vec<V3>,
-    oriented: bool,
+    /// Points and normals alone.
+    scan: BodyScan,
     /// Points between the part's label and another one.
     boundary: Vec<P3>,
     /// Vertex of the clothed template that each point may lie near.
@@ -120,12 +103,37 @@ impl PartScan {
         };
         let edges = edges.iter().filter(crosses);
         Self {
-            points: some.iter().map(|i| scan.points[*i]).collect(),
-            normals: some.iter().map(|i| scan.normals[*i]).collect(),
-            oriented: scan.oriented,
+            scan: BodyScan {
+                points: some.iter().map(|i| scan.points[*i]).collect(),
+                normals: some.iter().map(|i| scan.normals[*i]).collect(),
+                oriented: scan.oriented,
+                ..BodyScan::default()
+            },
             boundary: edges.map(middle).collect(),
             near: some.iter().map(|i| near[*i]).collect(),
         }
+    }
+    /// Adds a pull of each ring vertex at `surface` to the mean of the boundary points nearest to it; their mean
+    /// distance, metres.
+    fn pull_rings(&self, ring: &[u32], surface: &[P3], weight: f64, pulls: &mut Vec<Pull>) -> f64 {
+        let places: Vec<P3> = ring.iter().map(|v| surface[*v as usize]).collect();
+        let tree = PointTree::new(&places);
+        let mut sums = vec![(V3::zeros(), 0.0f32); ring.len()];
+        let (mut total, mut count) = (0.0, 0.0);
+        for p in &self.boundary {
+            if let Some((k, d)) = tree.nearest(p, RING_REACH) {
+                sums[k].0 += p.coords;
+                sums[k].1 += 1.0;
+                total += f64::from(d.sqrt());
+                count += 1.0;
+            }
+        }
+        pulls.extend(ring.iter().zip(&sums).map(|(v, (sum, n))| Pull {
+            at: PullPlace::Vertex(*v),
+            weight: if *n > 0.0 { weight } else { 0.0 },
+            target: P3::from(sum / n.max(1.0)),
+        }));
+        if count > 0.0 { total / count } else { 0.0 }
     }
 }
 
@@ -133,14 +141,10 @@ impl PartScan {
 #[derive(Debug)]
 pub struct PartFit {
     part: ClothPart,
-    energy: QuadraticEnergy,
-    edges: Vec<[u32; 2]>,
-    /// Stencils: edges, then Laplacians, then rings.
-    ranges: [usize; 3],
-    bvh: Bvh,
-    /// Faces around each vertex.
-    around: Csr,
-    neighbours: Arc<Csr>,
+    /// Vertices of its rings.
+    ring: Vec<u32>,
+    fit: SurfaceFit,
+    pairing: ScanPairing,
 }
 
 impl PartFit {
@@ -150,15 +154,13 @@ impl PartFit {
     /// [`CaptureError::Solve`] for a part too large.
     pub fn new(part: &ClothPart, rest: &[P3]) -> Result<Self, CaptureError> {
         let n = part.nodes.len();
-        let edges = edges(&part.faces);
-        let neighbours = Csr::of_edges(n, &edges);
-        let mut on_ring = vec![false; n];
-        part.rings
-            .iter()
+        let neighbours = Csr::of_edges(n, &edges(&part.faces));
+        let ring: Vec<u32> = (part.rings.iter())
             .flat_map(|r| &r.vertices)
-            .for_each(|v| on_ring[*v as usize] = true);
-        let mut stencils: Vec<Stencil> =
-            edges.iter().map(|e| Stencil::edge(*e, EVEN_EDGE)).collect();
+            .copied()
+            .collect();
+        let mut on_ring = vec![false; n];
+        ring.iter().for_each(|v| on_ring[*v as usize] = true);
         let laplacian = |v: u32| {
             let row = neighbours.row(v as usize);
             let mut vertices = vec![v];
@@ -172,26 +174,21 @@ impl PartFit {
             }
         };
         let inner = (0..n as u32).filter(|v| !on_ring[*v as usize]);
-        stencils.extend(inner.map(laplacian));
-        let second = stencils.len();
+        let mut bends = Vec::new();
         for ring in &part.rings {
             let k = ring.vertices.len();
-            stencils.extend((0..k).map(|i| Stencil {
+            bends.extend((0..k).map(|i| Stencil {
                 vertices: [k + i - 1, i, i + 1].map(|j| ring.vertices[j % k]).to_vec(),
                 factors: vec![1.0, -2.0, 1.0],
                 weight: 1.0,
             }));
         }
-        let corners = part.faces.iter().enumerate();
-        let corners = corners.flat_map(|(k, f)| f.map(|v| (v, k as u32)));
+        let groups = vec![inner.map(laplacian).collect(), bends];
         Ok(Self {
-            around: Csr::from_pairs(n, &corners.collect::<Vec<_>>()),
-            ranges: [edges.len(), second, stencils.len()],
-            energy: QuadraticEnergy::new(n, stencils, &part.faces)?,
-            bvh: Bvh::new(&part.faces, rest),
+            fit: SurfaceFit::new("garment part", n, &part.faces, |_| EVEN_EDGE, groups)?,
+            pairing: ScanPairing::new(&part.faces, rest, false),
             part: part.clone(),
-            edges,
-            neighbours: Arc::new(neighbours),
+            ring,
         })
     }
 
@@ -208,153 +205,46 @@ impl PartFit {
     ) -> Result<PartFitReport, CaptureError> {
         let area = area(&self.part, model);
         let vertex = area / model.len().max(1) as f64;
-        let stride = scan.points.len().div_ceil(config.points.max(1)).max(1);
-        let point = area / scan.points.len().div_ceil(stride).max(1) as f64;
-        let mut report = PartFitReport::default();
-        let mut cache = self.cache((scan, stride), config);
-        let neighbours = self.neighbours.clone();
-        let mut active = ActiveVertices::new(&neighbours, config.still);
-        while report.iterations < config.iterations {
-            let matches = self.pair((scan, stride), surface, config, &mut cache);
-            self.assemble(model, (&matches, point), vertex, config);
-            report.boundary_error = self.add_boundary(scan, surface, config.boundary * vertex);
-
-            let faces = matches.iter().map(|m| self.part.faces[m.face as usize]);
-            active.see(faces, ring_vertices(&self.part));
-            report.iterations += 1;
-            if active.solve(&mut self.energy, surface, STAGE)? < CONVERGED {
-                break;
-            }
-        }
-        active.finish(&mut self.energy, surface, STAGE)?;
-        let matches = self.pair((scan, stride), surface, config, &mut cache);
-        report.queries = cache.counts();
-        report.vertices = active.counts();
-        report.error = mean_distance(&matches);
-        report.paired = matches.len();
-        Ok(report)
-    }
-
-    /// Fills the system with all terms but those of the boundary; `point` and `vertex` are the areas of a scan point and of
-    /// a vertex, m².
-    fn assemble(
-        &mut self,
-        model: &[P3],
-        (matches, point): (&[PartMatch], f64),
-        vertex: f64,
-        config: &PartFitConfig,
-    ) {
-        self.energy.reset();
-        for (i, e) in self.edges.iter().enumerate() {
-            let d = (model[e[0] as usize] - model[e[1] as usize]).cast::<f64>();
-            self.energy
-                .add_stencil(i, config.coupling * config.coupling, d.into());
-        }
+        let count = scan.scan.points.len();
+        let points = ScanPoints::of(&scan.scan, count.div_ceil(config.points.max(1)));
+        self.begin(scan, points.stride, config.settled);
         // A Laplacian of size δ on an even mesh bends like δ / h², so its weight is length⁴ / h⁴ by area.
         let bend = (config.laplacian * config.laplacian / vertex).powi(2) * vertex;
-        (self.ranges[0]..self.ranges[1]).for_each(|i| self.energy.add_stencil(i, bend, [0.0; 3]));
-        let smooth = config.smoothness * vertex;
-        (self.ranges[1]..self.ranges[2]).for_each(|i| self.energy.add_stencil(i, smooth, [0.0; 3]));
-        for (v, p) in model.iter().enumerate() {
-            self.energy.add_vertex(v as u32, ANCHOR * vertex, p);
-        }
-        for m in matches {
-            self.energy
-                .add_face_point(m.face, m.corners, point * m.weight, &m.target);
-        }
+        let terms = SurfaceTerms {
+            model,
+            coupling: config.coupling,
+            smoothness: &[bend, config.smoothness * vertex],
+            anchor: ANCHOR * vertex,
+            iterations: config.iterations,
+            converged: CONVERGED,
+            still: config.still,
+        };
+        let mut boundary_error = 0.0;
+        let mut report = self.fit.run(&terms, surface, |x| {
+            let matches = self.pairing.pair(&points, x, config.sigma);
+            let mut pulls = points.pulls(&matches, area).collect();
+            let weight = config.boundary * vertex;
+            boundary_error = scan.pull_rings(&self.ring, x, weight, &mut pulls);
+            Ok(Some(pulls))
+        })?;
+        (report.error, report.paired) =
+            explained(&self.pairing.pair(&points, surface, config.sigma));
+        report.queries = self.pairing.counts();
+        Ok(PartFitReport {
+            surface: report,
+            boundary_error,
+        })
     }
 
-    /// Cache whose searches start at the faces near which the single mesh had the points, every `stride`-th of them.
-    fn cache(&self, (scan, stride): (&PartScan, usize), config: &PartFitConfig) -> FaceCache {
-        let mut cache = FaceCache::new(scan.points.len(), config.settled);
+    /// Starts searches at the faces near which the single mesh had the points, every `stride`-th of them.
+    fn begin(&mut self, scan: &PartScan, stride: usize, settled: f32) {
+        self.pairing.begin(scan.near.len(), settled);
         for (i, node) in scan.near.iter().enumerate().step_by(stride) {
             if let Ok(v) = self.part.nodes.binary_search(node) {
-                let last = self.around.row(v).last();
-                last.into_iter().for_each(|f| cache.start_at(i, *f));
+                self.pairing.start_around(i, v);
             }
         }
-        cache
     }
-
-    /// Places of every `stride`-th point.
-    fn pair(
-        &mut self,
-        (scan, stride): (&PartScan, usize),
-        surface: &[P3],
-        config: &PartFitConfig,
-        cache: &mut FaceCache,
-    ) -> Vec<PartMatch> {
-        self.bvh.refit(surface);
-        cache.advance(&self.part.faces, surface);
-        let kernel = GemanMcClure {
-            sigma: config.sigma,
-        };
-        let query = QuerySurface {
-            tree: &self.bvh,
-            vertices: surface,
-            around: &self.around,
-        };
-        let points = QueryPoints {
-            points: &scan.points,
-            normals: &scan.normals,
-            oriented: scan.oriented,
-            stride,
-            left_out: &[],
-        };
-        let matched = |(i, of_scan, found): (usize, ScanNormal, Option<SurfacePoint>)| {
-            let found = found?;
-            let face = &self.part.faces[found.face as usize];
-            let own = face_normal(surface, face).try_normalize(f32::MIN_POSITIVE)?;
-            of_scan.agrees(&own, NORMALS).then(|| PartMatch {
-                face: found.face,
-                corners: found.weights,
-                target: scan.points[i],
-                distance: found.distance,
-                weight: kernel.weight(f64::from(found.distance * found.distance)),
-            })
-        };
-        let found = cache.closest_each(&query, &points, NORMALS);
-        found.into_iter().filter_map(matched).collect()
-    }
-
-    /// Pulls each ring vertex to the mean of the scan's boundary points nearest to it; their mean distance, metres.
-    fn add_boundary(&mut self, scan: &PartScan, surface: &[P3], weight: f64) -> f64 {
-        let ring: Vec<u32> = ring_vertices(&self.part).collect();
-        let places: Vec<P3> = ring.iter().map(|v| surface[*v as usize]).collect();
-        let tree = PointTree::new(&places);
-        let mut sums = vec![(V3::zeros(), 0.0f32); ring.len()];
-        let (mut total, mut count) = (0.0, 0.0);
-        for p in &scan.boundary {
-            if let Some((k, d)) = tree.nearest(p, RING_REACH) {
-                sums[k].0 += p.coords;
-                sums[k].1 += 1.0;
-                total += f64::from(d.sqrt());
-                count += 1.0;
-            }
-        }
-        for (v, (sum, n)) in ring.iter().zip(&sums).filter(|(_, s)| s.1 > 0.0) {
-            self.energy.add_vertex(*v, weight, &P3::from(sum / *n));
-        }
-        if count > 0.0 { total / count } else { 0.0 }
-    }
-}
-
-#[derive(Clone, Copy, Debug)]
-struct PartMatch {
-    face: u32,
-    corners: [f32; 3],
-    target: P3,
-    distance: f32,
-    weight: f64,
-}
-
-fn ring_vertices(part: &ClothPart) -> impl Iterator<Item = u32> + '_ {
-    part.rings.iter().flat_map(|r| &r.vertices).copied()
-}
-
-fn mean_distance(matches: &[PartMatch]) -> f64 {
-    let sum: f64 = matches.iter().map(|m| f64::from(m.distance)).sum();
-    sum / matches.len().max(1) as f64
 }
 
 fn area(part: &ClothPart, vertices: &[P3]) -> f64 {

@@ -4,12 +4,12 @@ use super::color_mixture::ColorMixture;
 use super::node_colors::NodeColors;
 use super::prior::{BodyRegion, LONG_TOP, Slot};
 use crate::CaptureError;
-use crate::mrf::{ExpansionConfig, MrfModel};
 use crate::scalp::scalp;
 use crate::topology::ClothTemplate;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 use tryon_body::Template;
+use tryon_geometry::mrf::{ExpansionConfig, MrfModel};
 
 /// Cost of a label change between neighbours of equal colour, nats (ψ of eq. 14).
 const SMOOTHNESS: f32 = 2.0;

@@ -10,8 +10,7 @@ use tryon_body::Template;
 #[cfg(test)]
 use tryon_geometry::math::P3;
 use tryon_geometry::math::V3;
-use tryon_geometry::mesh::{Csr, vertex_normals};
-use tryon_geometry::par::Par;
+use tryon_geometry::mesh::Csr;
 
 /// Distance up to which a scan point belongs to the surface below it, metres.
 const NEAR: f32 = 0.03;
@@ -98,15 +97,7 @@ impl NodeColors {
         height: impl Fn(&P3) -> f32,
     ) -> Self {
         let (mesh, regions) = (template.mesh(), BodyRegion::of_vertices(template));
-        let around = template.topology().vertex_faces();
-        let mut normals = Vec::new();
-        vertex_normals(
-            Par::Rayon,
-            mesh.vertices(),
-            mesh.faces(),
-            around,
-            &mut normals,
-        );
+        let normals = template.normals(mesh.vertices());
         let places = mesh.vertices().iter().zip(&regions).zip(&normals);
         let colors: Vec<_> = places
             .enumerate()
@@ -149,9 +140,8 @@ fn heights(
     template: &Template,
     (scan, points): (&BodyScan, &Csr),
 ) -> Vec<f32> {
-    let (faces, around) = (template.mesh().faces(), template.topology().vertex_faces());
-    let mut normals = Vec::new();
-    vertex_normals(Par::Rayon, &alignment.model, faces, around, &mut normals);
+    let faces = template.mesh().faces();
+    let normals = template.normals(&alignment.model);
     let height = |v: usize| {
         let left = points.row(v).iter().map(|p| {
             let m = &alignment.matches[*p as usize];

@@ -5,10 +5,10 @@ use super::labelling::Labelling;
 use super::prior::IMPOSSIBLE;
 use crate::CaptureError;
 use crate::align::SurfaceMatch;
-use crate::mrf::{ExpansionConfig, MrfModel};
 use crate::scan::BodyScan;
 use nalgebra::Vector3;
 use tryon_geometry::mesh::{Csr, Face};
+use tryon_geometry::mrf::{ExpansionConfig, MrfModel};
 
 /// Width of the band about the template's boundaries in which the scan decides, rings of nodes.
 const BAND: u32 = 3;

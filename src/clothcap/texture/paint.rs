@@ -2,7 +2,7 @@
 
 use super::atlas::TextureAtlas;
 use super::image::GarmentTexture;
-use crate::align::{ScanNormal, closest_facing};
+use crate::align::ScanNormal;
 use crate::scan::{BodyScan, TextureColor, mean_spacing};
 use tryon_geometry::math::{P3, V3};
 use tryon_geometry::mesh::Face;
@@ -47,8 +47,9 @@ impl ScanPaint {
                 normal: scan.normals[own[k].point as usize],
                 oriented: scan.oriented,
             };
-            let (at, _) = closest_facing((&bvh, vertices), &own[k].at, normal, NORMALS)?;
-            (at.distance < NEAR).then_some(at.point)
+            let at = bvh.closest(vertices, &own[k].at)?;
+            let face_normal = bvh.unit_normal(vertices, at.face)?;
+            (normal.agrees(&face_normal, NORMALS) && at.distance < NEAR).then_some(at.point)
         });
         let (points, colors): (Vec<P3>, Vec<[f32; 3]>) = found
             .iter()

@@ -1,12 +1,11 @@
 //! Points of many poses in one: each point moves with the surface that it lies on.
 
 use super::moving_parts::MovingParts;
-use crate::align::{ScanNormal, closest_facing};
-use crate::blended;
+use crate::align::ScanNormal;
 use crate::scan::BodyScan;
 use nalgebra::{Isometry3, Matrix4, Vector3};
 use std::collections::BTreeMap;
-use tryon_body::{BoneTransforms, SkinWeights, Template};
+use tryon_body::{BoneTransforms, PosedSkin, SkinWeights, Template};
 use tryon_geometry::math::{P3, V3};
 use tryon_geometry::mesh::Face;
 use tryon_geometry::par::{self, Par};
@@ -16,8 +15,6 @@ use tryon_geometry::spatial::Bvh;
 const FARTHEST: f32 = 0.06;
 /// Smallest cosine between the normals of point and surface.
 const NORMALS: f32 = 0.3;
-/// Least determinant of a blended transform: folded joints blend to nothing.
-const FLAT: f64 = 1e-3;
 /// Weight above which a point of several frames is kept: two grazing readings or half a frontal one.
 const LEAST_WEIGHT: f32 = 0.3;
 
@@ -94,6 +91,7 @@ pub(super) fn reposed(
 ) -> Vec<FusedPoint> {
     let bvh = Bvh::new(template.mesh().faces(), from.vertices);
     let weights = template.weights();
+    let skins = [from.bones, to].map(|bones| PosedSkin::blended(weights, bones));
     let mut out = Vec::new();
     par::map_into(Par::Rayon, points.points.len(), 256, &mut out, |i| {
         let (p, n) = (&points.points[i], points.normals[i]);
@@ -101,22 +99,19 @@ pub(super) fn reposed(
             normal: n,
             oriented: points.oriented,
         };
-        let (found, _) = closest_facing((&bvh, from.vertices), p, normal, NORMALS)?;
-        if found.distance > FARTHEST {
+        let found = bvh.closest(from.vertices, p)?;
+        let own = bvh.unit_normal(from.vertices, found.face)?;
+        if found.distance > FARTHEST || !normal.agrees(&own, NORMALS) {
             return None;
         }
         let face = bvh.faces()[found.face as usize];
-        let blend = |bones: &BoneTransforms| -> Matrix4<f64> {
+        let blend = |skin: &PosedSkin<'_>| -> Matrix4<f64> {
             let corners = face.iter().zip(found.weights);
             corners
-                .map(|(v, w)| blended(weights, bones, *v as usize) * f64::from(w))
+                .map(|(v, w)| skin.transform(*v as usize) * f64::from(w))
                 .sum()
         };
-        let seen = blend(from.bones);
-        if seen.fixed_view::<3, 3>(0, 0).determinant() < FLAT {
-            return None;
-        }
-        let motion = blend(to) * seen.try_inverse()?;
+        let motion = blend(&skins[1]) * PosedSkin::inverse(&blend(&skins[0]))?;
         let (parts, share) = largest_parts(weights, parts, (&face, found.weights));
         let cosine = n.dot(&(eye - p).normalize());
         Some(FusedPoint {

@@ -8,8 +8,9 @@ use std::sync::Arc;
 use tryon_body::{BodyShape, Pose, Template};
 use tryon_geometry::camera::{Calibration, RgbdFrame};
 use tryon_geometry::math::{Camera, P3, Rigid, V3, World};
+use tryon_tracking::still::StillSteps;
 use tryon_tracking::{
-    PartClasses, TrackerConfig, TrackerModel, TrackerState, Workspace, step, yaw_of_joints,
+    PartClasses, TrackerConfig, TrackerModel, TrackerState, Workspace, yaw_of_joints,
 };
 
 /// Key frames of a whole turn: one every 15°, so that each place is seen by eight within 60° of its normal.
@@ -84,22 +85,21 @@ impl TurnTracker {
     /// # Errors
     /// [`TurnError::Frame`] for one that does not fit the camera.
     pub fn step(&mut self, frame: &RgbdFrame) -> Result<(), TurnError> {
-        let steps = if self.count == 0 { FIRST_STEPS } else { 1 };
-        let lead = (FIRST_STEPS - 1) * STEP_NS;
-        let mut quality = 0.0;
-        for k in 0..steps {
-            let mut frame = frame.clone();
-            frame.time_ns = frame
-                .time_ns
-                .saturating_add(lead - (steps - 1 - k) * STEP_NS);
-            let report = step(&self.model, &mut self.state, &frame, &mut self.workspace);
-            quality = report
-                .map_err(|source| TurnError::Frame {
-                    frame: self.count,
-                    source,
-                })?
-                .quality;
-        }
+        let is_first = self.count == 0;
+        let steps = StillSteps {
+            count: if is_first { FIRST_STEPS } else { 1 },
+            interval_ns: STEP_NS,
+        };
+        let lead = if is_first { 0 } else { FIRST_STEPS - 1 };
+        let mut late = frame.clone();
+        late.time_ns = late.time_ns.saturating_add(lead * STEP_NS);
+        let report = steps.run(&self.model, &mut self.state, &late, &mut self.workspace);
+        let quality = report
+            .map_err(|source| TurnError::Frame {
+                frame: self.count,
+                source,
+            })?
+            .quality;
         if self.state.status.is_live() {
             self.live += 1;
             self.keep(frame, quality);

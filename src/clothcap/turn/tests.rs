@@ -5,7 +5,7 @@ use super::key_frames::{KeyFrame, KeyFrames};
 use super::{TurnConfig, TurnError, TurnTracker, fuse};
 use crate::scan::BodyScan;
 use crate::segment::BodyRegion;
-use crate::virtual_camera::{VirtualCamera, bounds};
+use crate::virtual_camera::{bounds, scan_frame};
 use nalgebra::{UnitQuaternion, Vector3};
 use std::f64::consts::{PI, TAU};
 use tryon_body::{BodyShape, BoneTransforms, Pose, embedded, skin};
@@ -13,6 +13,7 @@ use tryon_geometry::camera::{Calibration, DepthImage, Intrinsics, RgbdFrame};
 use tryon_geometry::math::{P3, Rigid, World};
 use tryon_geometry::par::Par;
 use tryon_geometry::spatial::Bvh;
+use tryon_tracking::still::VirtualCamera;
 
 /// Views of a body that stands with arms half raised, and its true surface as the camera faces it.
 fn views(count: usize) -> (KeyFrames, Vec<P3>) {
@@ -46,7 +47,7 @@ fn views(count: usize) -> (KeyFrames, Vec<P3>) {
             faces: template.mesh().faces().to_vec(),
             ..BodyScan::default()
         };
-        let image = camera.frame(&scan);
+        let image = scan_frame(&camera, &scan);
         // Tracked poses lean on what faces the camera, and are late by a degree.
         let off = if k == 0 { 0.0 } else { 0.01 };
         let (pose, vertices) = posed(yaw - 2.0 * off, Vector3::new(0.3 * off, 0.0, off));

@@ -2,12 +2,12 @@
 
 use anyhow::{Context, Result};
 use std::path::Path;
-use tryon::body::{RestBody, SkinWeights};
+use tryon::body::{PosedSkin, RestBody, SkinWeights};
+use tryon::clothcap::DressedPose;
 use tryon::clothcap::archive::CaptureHeader;
 use tryon::clothcap::picture::part_color;
 use tryon::clothcap::texture::TextureAtlas;
 use tryon::clothcap::topology::ClothTemplate;
-use tryon::clothcap::{DressedPose, unpose};
 use tryon::formats::gltf::{
     GlbInterpolation, GlbJoint, GlbJointMotion, GlbMesh, GlbMorphMotion, GlbMorphTarget,
     SkinnedGlb, SkinnedMesh, write_skinned_glb,
@@ -227,8 +227,10 @@ impl DressedMotion<'_> {
         nodes: Vec<usize>,
         posed: impl Fn(&DressedPose) -> &Vec<P3>,
     ) -> RestMesh {
-        let rest =
-            |f: &DressedPose| unpose(self.weights(), &f.bones, nodes.iter().copied(), posed(f));
+        let rest = |f: &DressedPose| {
+            let skin = PosedSkin::blended(self.weights(), &f.bones);
+            skin.unpose(nodes.iter().copied(), posed(f))
+        };
         let mut frames = self.frames.iter().map(rest);
         let vertices = frames.next().unwrap_or_default();
         let change = |f: Vec<P3>| f.iter().zip(&vertices).map(|(a, b)| a - b).collect();

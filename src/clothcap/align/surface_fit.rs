@@ -1,0 +1,191 @@
+//! Surface pulled to points: pair → couple → anchor → solve. Points pull at places of the surface, its edges stay near
+//! those of a model, its vertices near the model's, and the sparse system of all is solved until nothing moves.
+
+use super::active_vertices::{ActiveVertices, VertexCounts};
+use super::quadratic::{QuadraticEnergy, Stencil};
+use super::scan_pairing::QueryCounts;
+use crate::CaptureError;
+use std::ops::Range;
+use std::sync::Arc;
+use tryon_geometry::math::P3;
+use tryon_geometry::mesh::{Csr, Face, edges};
+
+/// Mean motion of the vertices below which a fit to a scan ends, metres.
+pub(crate) const CONVERGED: f32 = 5e-5;
+/// Motion of a vertex in an iteration up to which it is held in the next, metres: what it would still move is a
+/// fraction of that.
+pub(crate) const STILL: f32 = 1e-4;
+
+/// Place of the surface that is pulled at.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum PullPlace {
+    /// A vertex.
+    Vertex(u32),
+    /// Barycentric coordinates in a face.
+    Face(u32, [f32; 3]),
+}
+
+/// Pull of one place to a target. At weight 0 its vertices are solved with those that are pulled.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Pull {
+    /// Place.
+    pub(crate) at: PullPlace,
+    /// Weight of the squared distance.
+    pub(crate) weight: f64,
+    /// Target, metres.
+    pub(crate) target: P3,
+}
+
+/// Terms beside the pulls, and the end of the iterations.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct SurfaceTerms<'a> {
+    /// Surface that it is coupled and anchored to, metres, shape `[vertices]`.
+    pub(crate) model: &'a [P3],
+    /// Coupling length, metres: displacements that vary over shorter distances are suppressed.
+    pub(crate) coupling: f64,
+    /// Weight of each group of stencils.
+    pub(crate) smoothness: &'a [f64],
+    /// Weight of each vertex's pull to the model's: settles what no other term determines.
+    pub(crate) anchor: f64,
+    /// Most iterations.
+    pub(crate) iterations: usize,
+    /// Mean motion of the vertices below which they end, metres; 0 makes all.
+    pub(crate) converged: f32,
+    /// Motion of a vertex in an iteration up to which it is held in the next, metres; 0 solves all in each.
+    pub(crate) still: f32,
+}
+
+/// Report of a fit.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct SurfaceFitReport {
+    /// Solves.
+    pub iterations: usize,
+    /// Mean distance of paired scan points from the surface, metres.
+    pub error: f64,
+    /// Scan points with a partner in the last iteration.
+    pub paired: usize,
+    /// Nearest-point queries.
+    pub queries: QueryCounts,
+    /// Vertices.
+    pub vertices: VertexCounts,
+}
+
+/// Fit of the vertices of one mesh.
+#[derive(Debug)]
+pub(crate) struct SurfaceFit {
+    /// Name of the solve in faults.
+    stage: &'static str,
+    energy: QuadraticEnergy,
+    edges: Vec<[u32; 2]>,
+    /// Stencils of each group, after those of the edges.
+    groups: Vec<Range<usize>>,
+    neighbours: Arc<Csr>,
+}
+
+impl SurfaceFit {
+    /// Prepares the system of so many vertices; `edge` is the coupling of an edge, `groups` are further stencils whose
+    /// values vanish at best.
+    ///
+    /// # Errors
+    /// [`CaptureError::Solve`] for a mesh too large.
+    pub(crate) fn new(
+        stage: &'static str,
+        vertices: usize,
+        faces: &[Face],
+        edge: impl Fn([u32; 2]) -> f64,
+        groups: Vec<Vec<Stencil>>,
+    ) -> Result<Self, CaptureError> {
+        let edges = edges(faces);
+        let mut stencils: Vec<Stencil> =
+            edges.iter().map(|e| Stencil::edge(*e, edge(*e))).collect();
+        let group = |all: Vec<Stencil>| {
+            let first = stencils.len();
+            stencils.extend(all);
+            first..stencils.len()
+        };
+        let groups = groups.into_iter().map(group).collect();
+        Ok(Self {
+            stage,
+            energy: QuadraticEnergy::new(vertices, stencils, faces)?,
+            neighbours: Arc::new(Csr::of_edges(vertices, &edges)),
+            edges,
+            groups,
+        })
+    }
+
+    /// Moves the vertices `x` of the surface, metres. `pair` gives the pulls at a surface, or `None` to end.
+    ///
+    /// # Errors
+    /// [`CaptureError::Solve`], and those of `pair`.
+    pub(crate) fn run(
+        &mut self,
+        terms: &SurfaceTerms<'_>,
+        x: &mut Vec<P3>,
+        mut pair: impl FnMut(&[P3]) -> Result<Option<Vec<Pull>>, CaptureError>,
+    ) -> Result<SurfaceFitReport, CaptureError> {
+        let neighbours = self.neighbours.clone();
+        let mut active = ActiveVertices::new(&neighbours, terms.still);
+        let mut iterations = 0;
+        while iterations < terms.iterations {
+            let Some(pulls) = pair(x)? else {
+                break;
+            };
+            self.energy.reset();
+            self.couple(terms);
+            self.anchor(terms);
+            active.see(self.pull(&pulls));
+            iterations += 1;
+            if active.solve(&mut self.energy, x, self.stage)? < terms.converged {
+                break;
+            }
+        }
+        active.finish(&mut self.energy, x, self.stage)?;
+        Ok(SurfaceFitReport {
+            iterations,
+            vertices: active.counts(),
+            ..SurfaceFitReport::default()
+        })
+    }
+
+    /// Edges of the mesh.
+    pub(crate) fn edges(&self) -> &[[u32; 2]] {
+        &self.edges
+    }
+
+    /// Edges near those of the model, and the groups of stencils near zero.
+    fn couple(&mut self, terms: &SurfaceTerms<'_>) {
+        for (k, [a, b]) in self.edges.iter().enumerate() {
+            let d = (terms.model[*a as usize] - terms.model[*b as usize]).cast::<f64>();
+            let scale = terms.coupling * terms.coupling;
+            self.energy.add_stencil(k, scale, d.into());
+        }
+        for (group, weight) in self.groups.iter().zip(terms.smoothness) {
+            let all = group.clone();
+            all.for_each(|k| self.energy.add_stencil(k, *weight, [0.0; 3]));
+        }
+    }
+
+    /// Vertices near those of the model.
+    fn anchor(&mut self, terms: &SurfaceTerms<'_>) {
+        for (v, p) in (0..).zip(terms.model) {
+            self.energy.add_vertex(v, terms.anchor, p);
+        }
+    }
+
+    /// Adds pulls; their vertices.
+    fn pull<'a>(&'a mut self, pulls: &'a [Pull]) -> impl Iterator<Item = u32> + 'a {
+        for p in pulls {
+            match p.at {
+                PullPlace::Vertex(v) => self.energy.add_vertex(v, p.weight, &p.target),
+                PullPlace::Face(f, corners) => {
+                    self.energy.add_face_point(f, corners, p.weight, &p.target);
+                }
+            }
+        }
+        let faces = self.energy.faces();
+        pulls.iter().flat_map(move |p| match p.at {
+            PullPlace::Vertex(v) => [v; 3],
+            PullPlace::Face(f, _) => faces[f as usize],
+        })
+    }
+}
