@@ -2,13 +2,11 @@
 
 use super::error::MeshGarmentError;
 use super::file_frame::{FileFrame, bounds};
-use super::skin_binding::skin_normals;
 use nalgebra::{UnitQuaternion, Vector3};
 use std::sync::Arc;
-use tryon_body::{BodyShape, BoneTransforms, Pose, RestBody, Template, skin};
+use tryon_body::{BodyShape, BoneTransforms, Pose, RestBody, SkinSearch, Template, skin};
 use tryon_geometry::math::{Body, P3, Rigid, V3, World, log_so3};
 use tryon_geometry::par::Par;
-use tryon_geometry::spatial::PointTree;
 
 /// Limits of a garment's largest extent, metres; they decide the file's unit.
 const EXTENT: [f32; 2] = [0.22, 2.2];
@@ -154,15 +152,14 @@ impl<'a> GuessFit<'a> {
     /// Mean distance of the cloth from its height over the skin, plus the prior, metres.
     fn cost(&self, q: &Guess) -> f32 {
         let (vertices, _) = self.stand(q);
-        let normals = skin_normals(self.template, &vertices);
-        let tree = PointTree::new(&vertices);
+        let skin = SkinSearch::new(self.template, &vertices, 0.0);
         let shift = V3::new(0.0, q[2] as f32, q[3] as f32);
         let distance = |p: &P3| {
             let p = p + shift;
-            let Some((near, d2)) = tree.nearest(&p, ANYWHERE) else {
+            let Some((near, d2)) = skin.nearest(&p, &V3::zeros(), ANYWHERE) else {
                 return FAR * INSIDE;
             };
-            if (p - vertices[near]).dot(&normals[near]) < 0.0 {
+            if skin.height(&p, near) < 0.0 {
                 (INSIDE * d2.sqrt()).min(FAR * INSIDE)
             } else {
                 (d2.sqrt() - ABOVE).abs().min(FAR)
@@ -218,7 +215,7 @@ mod tests {
     fn locate_finds_unit_and_shift_of_a_garment_that_is_an_offset_skin() {
         let t = embedded::template();
         let x = t.mesh().vertices();
-        let normals = skin_normals(&t, x);
+        let normals = t.normals(x);
         let garment: Vec<P3> = (0..x.len())
             .filter(|i| (0.9..1.3).contains(&x[*i].y) && x[*i].x.abs() < 0.2)
             .map(|i| (x[i] + normals[i] * ABOVE + V3::new(0.0, 0.0, 0.04)) * 1e3)

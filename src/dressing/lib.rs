@@ -59,7 +59,6 @@ mod retarget;
 mod rig_standing;
 mod sew;
 mod skin;
-mod skin_binding;
 mod source_body;
 mod suggest;
 mod waistband;

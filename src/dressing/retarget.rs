@@ -4,7 +4,6 @@
 
 use super::body_sections::BodySections;
 use super::bone_map::{BoneMap, bone_maps};
-use super::skin_binding::skin_normals;
 use tryon_body::Template;
 use tryon_body::parts::vertex_masks;
 use tryon_garment::Region;
@@ -41,7 +40,7 @@ impl Retargeting {
         let skin = TargetSkin::new(target, sections);
         for rounds in SMOOTHING {
             let mapped: Vec<P3> = (0..n).map(|i| out.skin_vertex(source, i)).collect();
-            let normals = skin_normals(source, &mapped);
+            let normals = source.normals(&mapped);
             let mut gaps: Vec<Option<V3d>> = (0..n)
                 .map(|i| skin.gap(parts[i], &mapped[i], &normals[i]))
                 .collect();
@@ -93,7 +92,7 @@ struct TargetSkin<'a> {
 
 impl<'a> TargetSkin<'a> {
     fn new(target: &Template, sections: &'a BodySections) -> Self {
-        let (vertices, normals) = (&sections.vertices, skin_normals(target, &sections.vertices));
+        let (vertices, normals) = (&sections.vertices, target.normals(&sections.vertices));
         let search = |part: Region| {
             let own: Vec<usize> = (0..sections.parts.len())
                 .filter(|i| sections.parts[*i] & part.0 != 0)

@@ -1,9 +1,8 @@
 //! Classification of a piece of a mesh garment by the skin it lies over.
 
 use crate::file_frame::bounds;
-use crate::skin_binding::SkinBinding;
-use tryon_body::Template;
 use tryon_body::parts::vertex_masks;
+use tryon_body::{SkinBinding, Template};
 use tryon_formats::sewn_obj::SewnObj;
 use tryon_garment::{GarmentKind, Region};
 use tryon_geometry::math::P3;

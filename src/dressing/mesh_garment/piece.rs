@@ -3,10 +3,10 @@
 use super::anchors::anchors;
 use super::classifier::{LEGS, PieceClassifier, PieceShape, Support};
 use super::grading::{Grading, LimbShares};
-use super::skin_lift::SkinLift;
+use super::skin_lift::lifted;
 use super::surface::{follow_both_legs, orient_outwards, unroll};
 use crate::retarget::Retargeting;
-use crate::skin_binding::SkinBinding;
+use tryon_body::{SkinBinding, SkinSearch};
 use tryon_formats::obj::ObjMesh;
 use tryon_formats::sewn_obj::SewnObj;
 use tryon_garment::import::{
@@ -221,17 +221,17 @@ impl GarmentPiece {
         let mut anchors = self.garment.anchors.iter();
         anchors.any(|a| a.kind == AnchorKind::Rigid)
     }
-    /// The piece on another body: its mesh, and positions in the canonical pose (m). `lift` puts points above the skin.
+    /// The piece on another body: its mesh, and positions in the canonical pose (m). Points are put above `skin`.
     pub(super) fn retargeted(
         &self,
         map: &Retargeting,
-        lift: &SkinLift<'_>,
+        skin: &SkinSearch<'_>,
     ) -> (GarmentMesh, Vec<P3>) {
         let (binding, rigid) = (&self.binding, self.is_rigid());
         let x: Vec<P3> = (0..self.positions.len())
             .map(|i| {
                 let p = map.point(&self.positions[i], &binding.joints[i], &binding.vertices[i]);
-                if rigid { p } else { lift.lifted(p) }
+                if rigid { p } else { lifted(skin, p) }
             })
             .collect();
         let mut garment = self.garment.clone();

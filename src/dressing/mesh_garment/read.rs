@@ -4,7 +4,7 @@ use super::classifier::PieceClassifier;
 use super::layers::by_layer;
 use super::piece::{GarmentPiece, PieceBuilder};
 use super::sizing::{Sizing, SourceCloth};
-use super::skin_lift::SkinLift;
+use super::skin_lift::lifted;
 use crate::body_sections::BodySections;
 use crate::error::MeshGarmentError;
 use crate::finished::FinishedGarment;
@@ -13,8 +13,8 @@ use crate::source_body::SourceBody;
 use crate::suggest::Suggestion;
 use std::path::Path;
 use std::sync::Arc;
-use tryon_body::Template;
 use tryon_body::measure::Measurements;
+use tryon_body::{SkinSearch, Template};
 use tryon_formats::obj::ObjMesh;
 use tryon_formats::sewn_obj::SewnObj;
 use tryon_garment::import::{read_mesh, split};
@@ -168,9 +168,9 @@ impl MeshGarment {
     }
     /// Vertices of each piece off the skin of the source body, metres.
     fn off_skin(&self) -> Vec<Vec<P3>> {
-        let lift = SkinLift::new(&self.source, self.source.mesh().vertices());
-        let lifted = |p: &GarmentPiece| p.positions.iter().map(|p| lift.lifted(*p)).collect();
-        self.pieces.iter().map(lifted).collect()
+        let skin = SkinSearch::new(&self.source, self.source.mesh().vertices(), 0.0);
+        let piece = |p: &GarmentPiece| p.positions.iter().map(|p| lifted(&skin, *p)).collect();
+        self.pieces.iter().map(piece).collect()
     }
     /// Size of the body that it was made on; `None` for a garment in one size, made to measure.
     pub fn own_size(&self) -> Option<Size> {
@@ -242,10 +242,9 @@ impl MeshGarment {
         sections: &BodySections,
     ) -> Vec<(GarmentMesh, Vec<P3>)> {
         let map = Retargeting::new(&self.source, template, sections);
-        let skin = &sections.vertices;
-        let lift = SkinLift::new(template, skin);
+        let skin = SkinSearch::new(template, &sections.vertices, 0.0);
         let pieces = self.pieces.iter();
-        pieces.map(|p| p.retargeted(&map, &lift)).collect()
+        pieces.map(|p| p.retargeted(&map, &skin)).collect()
     }
 }
 

@@ -1,7 +1,6 @@
 //! Orientation, texture coordinates and joint weights of a piece of cloth.
 
-use crate::skin_binding::SkinBinding;
-use tryon_body::Template;
+use tryon_body::{SkinBinding, Template};
 use tryon_garment::GarmentMesh;
 use tryon_geometry::math::{P3, V3};
 use tryon_geometry::mesh::face_normal;
