@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Continuous collision detection of the IPC Toolkit beside this project's, on the same queries in one run.
 
-    python3 benches/peers/ccd_ipctk.py ../shared/data/ccd/sample_queries_mit [--tryon target/release/tryon]
+    python3 benches/peers/ccd_ipctk.py ../shared/data/ccd/sample_queries_mit [--bench target/release/tryon-bench]
 
 Tight Inclusion (Wang et al. 2021) and additive CCD (Li et al. 2021) at their defaults. Missed impacts and false alarms against the exact truth.
 Nanoseconds a query: median over queries of the best of five calls, less a call of the same binding that ends at once
@@ -70,7 +70,7 @@ def judge(method, queries):
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("root", type=pathlib.Path)
-    parser.add_argument("--tryon", default="target/release/tryon")
+    parser.add_argument("--bench", default="target/release/tryon-bench")
     args = parser.parse_args()
     queries = list(read_tree(args.root))
     free = sum(not q[3] for q in queries)
@@ -84,7 +84,7 @@ def main():
     for name, method in methods.items():
         _, missed, alarms, median, mean = judge(method, queries)
         print(line.format(name, missed, alarms, 100.0 * alarms / free, median, mean), flush=True)
-    done = subprocess.run([args.tryon, "ccd", "--queries", args.root, "--json"], check=True, capture_output=True, text=True)
+    done = subprocess.run([args.bench, "ccd", "--queries", args.root, "--json"], check=True, capture_output=True, text=True)
     total = json.loads(done.stdout)["total"]
     alarms = total["false_alarms"]
     row = (total["missed"], alarms, 100.0 * alarms / free, total["median_ns"], total["mean_ns"])

@@ -38,7 +38,7 @@ impl OfflineDrapeReport {
 }
 
 /// Most steps on a mesh that starts from a coarser one's rest. What moves on from there, the hem of a dress by a millimetre
-/// a step, does so for as long as was tried (decision 068).
+/// a step, does so for as long as was tried (decision 079).
 const FINER_STEPS: usize = 12;
 /// Most steps on the finest mesh after those, to the solver's tolerance.
 const FINAL_STEPS: usize = 2;

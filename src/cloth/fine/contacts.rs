@@ -33,7 +33,7 @@ pub struct ContactSettings {
     /// Speed from which friction is full (m/s); what sticks creeps slower than that.
     pub creep: f64,
     /// Displacement in one step from which friction is full at the latest (m): what sticks creeps less than that in a step,
-    /// however long. A fifth of what a drape counts as settled; decision 068 has others.
+    /// however long. A fifth of what a drape counts as settled; decision 079 has others.
     pub slip: f64,
     /// Motion of vertices that the candidates allow for beyond that of the query (m). Larger: fewer queries, more pairs.
     pub margin: f64,
