@@ -224,9 +224,7 @@ mod tests {
                 m.corners[k] = 1.0;
             }
         }
-        let mut normals = Vec::new();
-        let around = template.topology().vertex_faces();
-        vertex_normals(Par::Seq, &points, mesh.faces(), around, &mut normals);
+        let normals = template.normals(&points);
         let seen = |(p, n): (&P3, &V3)| {
             let color = paint(p);
             let front = n.z > 0.0;

@@ -13,6 +13,7 @@ use tryon_geometry::math::P3;
 const FIRM: f64 = 8.0;
 /// Pull to the model's vertices beside that of the data: settles what no point and no edge determines.
 const ANCHOR: f64 = 1e-4;
+
 /// Kernel and coupling of one stage.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SurfaceStage {
@@ -119,7 +120,6 @@ impl FreeSurface {
         } else {
             Vec::new()
         };
-        let all = ScanPoints::of(scan, 1);
         self.pairing.begin(scan.points.len(), config.settled);
         let mut report = SurfaceFitReport::default();
         for stage in &config.stages {
@@ -145,7 +145,7 @@ impl FreeSurface {
         // Labels are read off these matches: each is searched.
         self.pairing.search_all();
         self.pairing.spread(&order);
-        self.matches = self.pairing.pair(&all, surface, last);
+        self.matches = self.pairing.pair(&ScanPoints::of(scan, 1), surface, last);
         (report.error, report.paired) = explained(&self.matches);
         report.queries = self.pairing.counts();
         Ok(report)

@@ -54,6 +54,26 @@ impl Stencil {
     }
 }
 
+/// Place of the surface that is pulled at.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum PullPlace {
+    /// A vertex.
+    Vertex(u32),
+    /// Barycentric coordinates in a face.
+    Face(u32, [f32; 3]),
+}
+
+/// Pull of one place to a target. At weight 0 its vertices are solved with those that are pulled.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Pull {
+    /// Place.
+    pub(crate) at: PullPlace,
+    /// Weight of the squared distance.
+    pub(crate) weight: f64,
+    /// Target, metres.
+    pub(crate) target: P3,
+}
+
 /// Storage of the entries of one stencil: lower triangle in the order of pairs (0,0), (1,0), (1,1), (2,0) …
 type Slots = Vec<u32>;
 
@@ -125,11 +145,6 @@ impl QuadraticEnergy {
         })
     }
 
-    /// Faces whose points can be pulled.
-    pub(crate) fn faces(&self) -> &[Face] {
-        &self.corners
-    }
-
     /// Empties the system.
     pub fn reset(&mut self) {
         self.values.fill(0.0);
@@ -176,6 +191,20 @@ impl QuadraticEnergy {
         self.values[slot] += weight;
         for (r, t) in self.rhs[vertex as usize].iter_mut().zip(target.iter()) {
             *r += weight * f64::from(*t);
+        }
+    }
+
+    /// Adds a pull; its vertices, a single one three times.
+    pub(crate) fn add_pull(&mut self, pull: &Pull) -> [u32; 3] {
+        match pull.at {
+            PullPlace::Vertex(v) => {
+                self.add_vertex(v, pull.weight, &pull.target);
+                [v; 3]
+            }
+            PullPlace::Face(face, corners) => {
+                self.add_face_point(face, corners, pull.weight, &pull.target);
+                self.corners[face as usize]
+            }
         }
     }
 

@@ -1,7 +1,7 @@
 //! Pairs of scan points and surface points, by distance and normal. Faces are kept from iteration to iteration while the
 //! surface around them hardly moves, and start the next search where it does.
 
-use super::surface_fit::{Pull, PullPlace};
+use super::quadratic::{Pull, PullPlace};
 use crate::scan::BodyScan;
 use serde::{Deserialize, Serialize};
 use tryon_geometry::math::{P3, V3};
@@ -34,6 +34,16 @@ impl ScanNormal {
     }
 }
 
+impl BodyScan {
+    /// Normal of a point.
+    pub(crate) fn normal(&self, i: usize) -> ScanNormal {
+        ScanNormal {
+            normal: self.normals[i],
+            oriented: self.oriented,
+        }
+    }
+}
+
 /// Points of a scan that are paired with a surface.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct ScanPoints<'a> {
@@ -52,13 +62,6 @@ impl<'a> ScanPoints<'a> {
             scan,
             stride: stride.max(1),
             left_out: &[],
-        }
-    }
-
-    fn normal(&self, i: usize) -> ScanNormal {
-        ScanNormal {
-            normal: self.scan.normals[i],
-            oriented: self.scan.oriented,
         }
     }
 
@@ -257,7 +260,7 @@ impl ScanPairing {
             false => self.tree.unit_normal(surface, at.face),
         };
         let matched = |i: usize, at: &SurfacePoint| {
-            let agrees = normal(at).is_some_and(|own| points.normal(i).agrees(&own, NORMALS));
+            let agrees = normal(at).is_some_and(|own| points.scan.normal(i).agrees(&own, NORMALS));
             let e2 = f64::from(at.distance * at.distance);
             SurfaceMatch {
                 face: at.face,
@@ -305,7 +308,7 @@ impl ScanPairing {
         points: &ScanPoints<'_>,
         surface: &[P3],
     ) -> Option<(SurfacePoint, FaceSearch)> {
-        let (p, normal, kept) = (&points.scan.points[i], points.normal(i), self.kept[i]);
+        let (p, normal, kept) = (&points.scan.points[i], points.scan.normal(i), self.kept[i]);
         if let Some(k) = kept
             && self.travel[k.face as usize] - k.travel < self.settled
         {

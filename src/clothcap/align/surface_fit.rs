@@ -2,7 +2,7 @@
 //! those of a model, its vertices near the model's, and the sparse system of all is solved until nothing moves.
 
 use super::active_vertices::{ActiveVertices, VertexCounts};
-use super::quadratic::{QuadraticEnergy, Stencil};
+use super::quadratic::{Pull, QuadraticEnergy, Stencil};
 use super::scan_pairing::QueryCounts;
 use crate::CaptureError;
 use std::ops::Range;
@@ -15,26 +15,6 @@ pub(crate) const CONVERGED: f32 = 5e-5;
 /// Motion of a vertex in an iteration up to which it is held in the next, metres: what it would still move is a
 /// fraction of that.
 pub(crate) const STILL: f32 = 1e-4;
-
-/// Place of the surface that is pulled at.
-#[derive(Clone, Copy, Debug)]
-pub(crate) enum PullPlace {
-    /// A vertex.
-    Vertex(u32),
-    /// Barycentric coordinates in a face.
-    Face(u32, [f32; 3]),
-}
-
-/// Pull of one place to a target. At weight 0 its vertices are solved with those that are pulled.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Pull {
-    /// Place.
-    pub(crate) at: PullPlace,
-    /// Weight of the squared distance.
-    pub(crate) weight: f64,
-    /// Target, metres.
-    pub(crate) target: P3,
-}
 
 /// Terms beside the pulls, and the end of the iterations.
 #[derive(Clone, Copy, Debug)]
@@ -133,7 +113,7 @@ impl SurfaceFit {
             self.energy.reset();
             self.couple(terms);
             self.anchor(terms);
-            active.see(self.pull(&pulls));
+            active.see(pulls.iter().flat_map(|p| self.energy.add_pull(p)));
             iterations += 1;
             if active.solve(&mut self.energy, x, self.stage)? < terms.converged {
                 break;
@@ -170,22 +150,5 @@ impl SurfaceFit {
         for (v, p) in (0..).zip(terms.model) {
             self.energy.add_vertex(v, terms.anchor, p);
         }
-    }
-
-    /// Adds pulls; their vertices.
-    fn pull<'a>(&'a mut self, pulls: &'a [Pull]) -> impl Iterator<Item = u32> + 'a {
-        for p in pulls {
-            match p.at {
-                PullPlace::Vertex(v) => self.energy.add_vertex(v, p.weight, &p.target),
-                PullPlace::Face(f, corners) => {
-                    self.energy.add_face_point(f, corners, p.weight, &p.target);
-                }
-            }
-        }
-        let faces = self.energy.faces();
-        pulls.iter().flat_map(move |p| match p.at {
-            PullPlace::Vertex(v) => [v; 3],
-            PullPlace::Face(f, _) => faces[f as usize],
-        })
     }
 }

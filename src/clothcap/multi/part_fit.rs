@@ -3,8 +3,8 @@
 use super::part::ClothPart;
 use crate::CaptureError;
 use crate::align::{
-    CONVERGED, EVEN_EDGE, Pull, PullPlace, ScanNormal, ScanPairing, ScanPoints, Stencil,
-    SurfaceFit, SurfaceFitReport, SurfaceTerms, explained,
+    CONVERGED, EVEN_EDGE, Pull, PullPlace, ScanPairing, ScanPoints, Stencil, SurfaceFit,
+    SurfaceFitReport, SurfaceTerms, explained,
 };
 use crate::scan::BodyScan;
 use tryon_geometry::math::{P3, V3};
@@ -89,13 +89,9 @@ impl PartScan {
         let some: Vec<usize> = (0..scan.points.len()).filter(own).collect();
         let crosses = |e: &&[u32; 2]| {
             let [a, b] = e.map(|v| labels[v as usize] == label);
-            let [n, m] = e.map(|v| &scan.normals[v as usize]);
-            let of_scan = ScanNormal {
-                normal: *m,
-                oriented: scan.oriented,
-            };
+            let [n, m] = e.map(|v| scan.normal(v as usize));
             // Edges of a cloud also join an arm and the torso behind it.
-            a != b && (!scan.faces.is_empty() || of_scan.agrees(n, BESIDE))
+            a != b && (!scan.faces.is_empty() || m.agrees(&n.normal, BESIDE))
         };
         let middle = |e: &[u32; 2]| {
             let [a, b] = e.map(|v| scan.points[v as usize]);

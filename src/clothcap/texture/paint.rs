@@ -2,7 +2,6 @@
 
 use super::atlas::TextureAtlas;
 use super::image::GarmentTexture;
-use crate::align::ScanNormal;
 use crate::scan::{BodyScan, TextureColor, mean_spacing};
 use tryon_geometry::math::{P3, V3};
 use tryon_geometry::mesh::Face;
@@ -43,10 +42,7 @@ impl ScanPaint {
         let own: Vec<TextureColor> = colors(scan).filter(|c| is_own(c.point as usize)).collect();
         let mut found = Vec::new();
         par::map_into(Par::Rayon, own.len(), 256, &mut found, |k| {
-            let normal = ScanNormal {
-                normal: scan.normals[own[k].point as usize],
-                oriented: scan.oriented,
-            };
+            let normal = scan.normal(own[k].point as usize);
             let at = bvh.closest(vertices, &own[k].at)?;
             let face_normal = bvh.unit_normal(vertices, at.face)?;
             (normal.agrees(&face_normal, NORMALS) && at.distance < NEAR).then_some(at.point)

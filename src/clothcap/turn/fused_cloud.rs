@@ -1,7 +1,6 @@
 //! Points of many poses in one: each point moves with the surface that it lies on.
 
 use super::moving_parts::MovingParts;
-use crate::align::ScanNormal;
 use crate::scan::BodyScan;
 use nalgebra::{Isometry3, Matrix4, Vector3};
 use std::collections::BTreeMap;
@@ -95,13 +94,9 @@ pub(super) fn reposed(
     let mut out = Vec::new();
     par::map_into(Par::Rayon, points.points.len(), 256, &mut out, |i| {
         let (p, n) = (&points.points[i], points.normals[i]);
-        let normal = ScanNormal {
-            normal: n,
-            oriented: points.oriented,
-        };
         let found = bvh.closest(from.vertices, p)?;
         let own = bvh.unit_normal(from.vertices, found.face)?;
-        if found.distance > FARTHEST || !normal.agrees(&own, NORMALS) {
+        if found.distance > FARTHEST || !points.normal(i).agrees(&own, NORMALS) {
             return None;
         }
         let face = bvh.faces()[found.face as usize];
