@@ -68,6 +68,7 @@
 //!
 //! - A dressed outfit on finer meshes, started by the preview: [`mod@mirror::offline_outfit`],
 //!   `src/garment/subdivision.rs`.
+//! - From a drape or a checkpoint through the motion of the body: [`mod@mirror::offline_run`].
 //!
 //! Garments from scans:
 //!

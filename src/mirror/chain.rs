@@ -3,7 +3,7 @@
 use super::body::PosedBody;
 use super::choice::Choice;
 use super::error::MirrorError;
-use super::offline_outfit::OfflineOutfit;
+use super::offline_run::OfflineRun;
 use super::outfit::{DressedOutfit, PutOn, Subject};
 use super::painter::{CapturedView, DrawnOutfit, OutfitPainter};
 use super::report::{MirrorFrame, StageTimer};
@@ -124,8 +124,7 @@ impl Mirror {
         self.worn.as_ref().map_or(&[], |w| &w.appearances)
     }
 
-    /// Picture of the last frame with the outfit as another solver moved it: vertices of the cloth and of the body that it
-    /// met (world, metres).
+    /// Picture of the last frame with the outfit as the offline solver moved it, on the body that it met.
     ///
     /// # Errors
     /// A vertex that is not finite.
@@ -133,14 +132,14 @@ impl Mirror {
         &self,
         painter: &mut OutfitPainter,
         frame: &RgbdFrame,
-        outfit: &OfflineOutfit,
-        [cloth, body]: [&[P3]; 2],
+        run: &OfflineRun<'_>,
     ) -> Result<ColorImage, MirrorError> {
+        let (outfit, state) = (run.outfit(), run.solver().state());
         let drawn = DrawnOutfit {
             garments: outfit.garments(),
             appearances: self.appearances(),
-            positions: &outfit.drawn_positions(cloth),
-            body,
+            positions: &outfit.drawn_positions(&state.positions()),
+            body: &state.obstacle_positions(),
         };
         let view = CapturedView {
             frame,

@@ -3,11 +3,12 @@
 
 use super::error::MirrorError;
 use super::offline_outfit::OfflineOutfit;
+use super::offline_run::OfflineRun;
 use super::outfit::DressedOutfit;
 use serde::{Deserialize, Serialize};
 use std::ops::ControlFlow;
 use std::time::Instant;
-use tryon_cloth::fine::{DrapeReport, DrapeSettings, FrameTargets, OfflineState, StartReport};
+use tryon_cloth::fine::{DrapeReport, DrapeSettings, FrameTargets, StartReport};
 use tryon_geometry::par::Par;
 
 /// Work of a drape on one mesh.
@@ -54,7 +55,7 @@ impl OfflineOutfit {
         worn: &DressedOutfit,
         par: Par,
         mut progress: impl FnMut(usize, &DrapeReport) -> ControlFlow<()>,
-    ) -> Result<(OfflineState, OfflineDrapeReport), MirrorError> {
+    ) -> Result<(OfflineRun<'_>, OfflineDrapeReport), MirrorError> {
         let coarser = (0..self.level()).map(|l| Self::with_level(worn, self.body_faces(), l));
         let coarser = coarser.collect::<Result<Vec<Self>, _>>()?;
         let (mut state, start) = coarser.first().unwrap_or(self).start(worn, par)?;
@@ -103,6 +104,7 @@ impl OfflineOutfit {
             });
             state = solver.state().clone();
         }
-        Ok((state, OfflineDrapeReport { start, levels }))
+        let run = OfflineRun::new(self, state, par)?;
+        Ok((run, OfflineDrapeReport { start, levels }))
     }
 }

@@ -8,7 +8,7 @@ use tryon_cloth::contact::broad_phase::EdgeFace;
 use tryon_cloth::contact::{ContactMesh, ContactSurface};
 use tryon_cloth::fine::{
     JoinedSurfaces, MotionState, OfflineCloth, OfflineError, OfflineSettings, OfflineSolver,
-    OfflineState, PinTarget, StartReport, checkpoint_state,
+    OfflineState, PinTarget, StartReport,
 };
 use tryon_garment::{GarmentMesh, GarmentSubdivision};
 use tryon_geometry::math::{P3, V3d};
@@ -122,7 +122,11 @@ impl OfflineOutfit {
     ///
     /// # Errors
     /// A state of another outfit or with a number that is not finite.
-    pub fn solver(&self, state: OfflineState, par: Par) -> Result<OfflineSolver<'_>, OfflineError> {
+    pub(super) fn solver(
+        &self,
+        state: OfflineState,
+        par: Par,
+    ) -> Result<OfflineSolver<'_>, OfflineError> {
         let mut settings = OfflineSettings::default();
         if let Some(contact) = &mut settings.contact {
             let total: f64 = (self.garments.iter())
@@ -153,20 +157,6 @@ impl OfflineOutfit {
             report.passes += again.passes;
         }
         Ok((self.state(fine, worn), report))
-    }
-
-    /// Solver in the state of a checkpoint, which it continues to the same bits.
-    ///
-    /// # Errors
-    /// Bytes that are no checkpoint, are damaged, or belong to other meshes.
-    pub fn resumed_solver(
-        &self,
-        checkpoint: &[u8],
-        par: Par,
-    ) -> Result<OfflineSolver<'_>, OfflineError> {
-        let mut solver = self.solver(checkpoint_state(checkpoint)?, par)?;
-        solver.resume(checkpoint)?;
-        Ok(solver)
     }
 
     /// State at rest at these vertices of the finer meshes and the body.

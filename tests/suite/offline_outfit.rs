@@ -5,10 +5,10 @@ use std::ops::ControlFlow;
 use tryon::body::measure::measure;
 use tryon::body::{BodyShape, Pose, embedded};
 use tryon::cloth::contact::{ContactMesh, ContactSurface};
-use tryon::cloth::fine::{FrameTargets, JoinedSurfaces, OfflineSolver};
+use tryon::cloth::fine::{JoinedSurfaces, OfflineSolver};
 use tryon::geometry::math::{P3, Rigid, V3, V3d, World};
 use tryon::geometry::par::Par;
-use tryon::mirror::{Choice, DressedOutfit, OfflineOutfit, PutOn, Subject};
+use tryon::mirror::{Choice, DressedOutfit, OfflineOutfit, OfflineRun, PutOn, Subject};
 
 /// A coarse skirt on the mean body, at rest; triangles and vertices of the body.
 fn worn() -> (DressedOutfit, Vec<[u32; 3]>, Vec<P3>) {
@@ -65,7 +65,7 @@ fn a_preview_goes_on_offline_without_intersections() {
     assert_eq!(outfit.drawn_positions(&vec![P3::origin(); count]).len(), 1);
 
     let mut steps = Vec::new();
-    let (state, report) = outfit
+    let (mut run, report) = outfit
         .drape(&worn, Par::Seq, |vertices, _| {
             steps.push(vertices);
             ControlFlow::Continue(())
@@ -78,9 +78,8 @@ fn a_preview_goes_on_offline_without_intersections() {
         steps.contains(&coarse) && steps.contains(&count),
         "{steps:?}"
     );
-    let before = state.now.x.clone();
-    let mut solver = outfit.solver(state, Par::Seq).expect("a solver");
-    assert_eq!(crossings(&outfit, &faces, &solver), 0);
+    let before = run.solver().state().now.x.clone();
+    assert_eq!(crossings(&outfit, &faces, run.solver()), 0);
 
     // The body moves aside, and the waistband with it; a sudden speed costs steps at any length.
     let aside = V3::new(0.001, 0.0, 0.0);
@@ -94,14 +93,9 @@ fn a_preview_goes_on_offline_without_intersections() {
     assert_eq!(moved.len(), body.len());
     let pins = outfit.pins(&moved);
     assert!(!pins.is_empty(), "the waistband");
-    let obstacle: Vec<V3d> = moved.iter().map(|p| p.coords.cast()).collect();
-    let targets = FrameTargets {
-        pins: &pins,
-        obstacle: &obstacle,
-    };
-    solver.advance(DT, &targets).expect("a frame");
-    assert_eq!(crossings(&outfit, &faces, &solver), 0);
-    let x = &solver.state().now.x;
+    run.follow(&moved, DT).expect("a frame");
+    assert_eq!(crossings(&outfit, &faces, run.solver()), 0);
+    let x = &run.solver().state().now.x;
     for pin in &pins {
         assert!(
             (x[pin.vertex as usize] - pin.target).norm() < 1e-4,
@@ -111,11 +105,14 @@ fn a_preview_goes_on_offline_without_intersections() {
     let sums = [&before, x].map(|x| x.iter().sum::<V3d>() / count as f64);
     assert!((sums[1] - sums[0]).x > 1e-4, "the skirt follows: {sums:?}");
 
-    let saved = solver.checkpoint(1);
-    let resumed = outfit.resumed_solver(&saved, Par::Seq);
-    assert_eq!(resumed.expect("its checkpoint").state(), solver.state());
+    let saved = run.solver().checkpoint(1);
+    let resumed = OfflineRun::resumed(&outfit, &saved, Par::Seq).expect("its checkpoint");
+    assert_eq!(resumed.solver().state(), run.solver().state());
     let coarse = OfflineOutfit::new(&worn, &faces, coarse).expect("coarse");
-    assert!(coarse.resumed_solver(&saved, Par::Seq).is_err(), "finer");
+    assert!(
+        OfflineRun::resumed(&coarse, &saved, Par::Seq).is_err(),
+        "finer"
+    );
 }
 
 #[test]
@@ -123,13 +120,12 @@ fn a_drape_that_breaks_off_leaves_finer_meshes_as_they_are() {
     let (worn, faces, _) = worn();
     let coarse = worn.model.outfit.garments[0].vertices;
     let outfit = OfflineOutfit::new(&worn, &faces, 4 * coarse).expect("finer");
-    let (state, report) = outfit
+    let (run, report) = outfit
         .drape(&worn, Par::Seq, |_, _| ControlFlow::Break(()))
         .expect("broken off");
-    assert_eq!(state.now.x.len(), outfit.cloth().len());
+    assert_eq!(run.solver().state().now.x.len(), outfit.cloth().len());
     let steps: Vec<usize> = report.levels.iter().map(|l| l.drape.steps).collect();
     assert_eq!(steps, [1, 0]);
     assert!(!report.is_settled());
-    let solver = outfit.solver(state, Par::Seq).expect("a solver");
-    assert_eq!(crossings(&outfit, &faces, &solver), 0);
+    assert_eq!(crossings(&outfit, &faces, run.solver()), 0);
 }

@@ -8,10 +8,9 @@ use std::sync::Arc;
 use tokio::sync::watch;
 use tonic::Status;
 use tryon::body::Template;
-use tryon::cloth::fine::{DrapeReport, FrameTargets};
-use tryon::geometry::math::V3d;
+use tryon::cloth::fine::DrapeReport;
 use tryon::geometry::par::Par;
-use tryon::mirror::{DressedOutfit, FrameClock, MirrorError, OfflineOutfit, time_step};
+use tryon::mirror::{DressedOutfit, FrameClock, MirrorError, OfflineOutfit, OfflineRun, time_step};
 use tryon_proto::convert::WireError;
 use tryon_proto::convert::garment::{WornGarment, topology_to_wire};
 use tryon_proto::v1::{
@@ -78,6 +77,14 @@ fn aborted(e: impl ToString) -> Status {
     Status::aborted(e.to_string())
 }
 
+/// Status of a drape that failed.
+fn refused(e: MirrorError) -> Status {
+    match e {
+        MirrorError::TangledStart { .. } => Status::failed_precondition(e.to_string()),
+        e => aborted(e),
+    }
+}
+
 /// Simulation from one snapshot on, or its remainder after a cancel.
 pub(crate) struct FineTask {
     snapshot: Snapshot,
@@ -92,6 +99,16 @@ struct LastFrame {
     captured_ns: u64,
     /// State after it.
     checkpoint: Vec<u8>,
+}
+
+impl LastFrame {
+    fn of(run: &OfflineRun<'_>, number: u32, exposure: FrameId) -> Self {
+        Self {
+            number,
+            captured_ns: exposure.capture_time_ns,
+            checkpoint: run.solver().checkpoint(u64::from(number)),
+        }
+    }
 }
 
 impl FineTask {
@@ -168,13 +185,7 @@ impl FineTask {
     /// # Errors
     /// FAILED_PRECONDITION for a start that cannot be freed of intersections, ABORTED for a step that is not solved.
     pub(crate) fn compute(mut self, publisher: &mut Publisher) -> Result<Option<Self>, Status> {
-        let mut flow = ControlFlow::Continue(());
-        if self.last.is_none() {
-            flow = self.drape(publisher)?;
-        }
-        if flow.is_continue() {
-            flow = self.animate(publisher)?;
-        }
+        let flow = self.run(publisher)?;
         Ok(flow.is_break().then_some(self).filter(Self::has_more))
     }
 
@@ -184,61 +195,55 @@ impl FineTask {
         self.last.is_none() || recording.is_some_and(|r| !r.is_closed() || !r.is_empty())
     }
 
-    /// The first frame. A drape that breaks off starts anew in the task that is left.
-    fn drape(&mut self, publisher: &mut Publisher) -> Result<ControlFlow<()>, Status> {
-        let show = |vertices, step: &DrapeReport| publisher.show(drape_step(vertices, step));
-        let draped = self.outfit.drape(&self.snapshot.outfit, Par::Rayon, show);
-        let (state, _) = draped.map_err(|e| match e {
-            MirrorError::TangledStart { .. } => Status::failed_precondition(e.to_string()),
-            e => aborted(e),
-        })?;
-        if publisher.is_cancelled() {
-            return Ok(ControlFlow::Break(()));
-        }
-        let exposure = self.snapshot.exposure;
-        let positions = state.positions();
-        let solver = self.outfit.solver(state, Par::Rayon).map_err(aborted)?;
-        self.last = Some(LastFrame {
-            number: 0,
-            captured_ns: exposure.capture_time_ns,
-            checkpoint: solver.checkpoint(0),
-        });
-        Ok(publisher.publish(&positions, Some(exposure)))
-    }
-
-    /// Frames of a recording that may still go on, after the last finished one.
-    fn animate(&mut self, publisher: &mut Publisher) -> Result<ControlFlow<()>, Status> {
-        let (Some(last), Some(recording)) = (&mut self.last, &mut self.snapshot.recording) else {
+    /// Frames of a recording that may still go on, after the drape or the last finished one. A drape that breaks off starts
+    /// anew in the task that is left.
+    fn run(&mut self, publisher: &mut Publisher) -> Result<ControlFlow<()>, Status> {
+        let (mut run, mut number, exposed_ns) = match self.last.take() {
+            Some(last) => {
+                let run = OfflineRun::resumed(&self.outfit, &last.checkpoint, Par::Rayon);
+                (run.map_err(aborted)?, last.number, last.captured_ns)
+            }
+            None => {
+                let show =
+                    |vertices, step: &DrapeReport| publisher.show(drape_step(vertices, step));
+                let worn = &self.snapshot.outfit;
+                let draped = self.outfit.drape(worn, Par::Rayon, show);
+                let (run, _) = draped.map_err(refused)?;
+                if publisher.is_cancelled() {
+                    return Ok(ControlFlow::Break(()));
+                }
+                let exposure = self.snapshot.exposure;
+                if publish(&run, publisher, exposure).is_break() {
+                    self.last = Some(LastFrame::of(&run, 0, exposure));
+                    return Ok(ControlFlow::Break(()));
+                }
+                (run, 0, exposure.capture_time_ns)
+            }
+        };
+        let Some(recording) = &mut self.snapshot.recording else {
             return Ok(ControlFlow::Continue(()));
         };
-        let checkpoint = std::mem::take(&mut last.checkpoint);
-        let solver = self.outfit.resumed_solver(&checkpoint, Par::Rayon);
-        let mut solver = solver.map_err(aborted)?;
-        drop(checkpoint);
-        let mut clock = FrameClock::at(last.captured_ns);
+        let mut clock = FrameClock::at(exposed_ns);
         while let Some(body) = recording.blocking_recv() {
             let dt = time_step(clock.gap(body.exposure.capture_time_ns));
-            let obstacle: Vec<V3d> = body.vertices.iter().map(|p| p.coords.cast()).collect();
-            let targets = FrameTargets {
-                pins: &self.outfit.pins(&body.vertices),
-                obstacle: &obstacle,
-            };
-            solver.advance(dt, &targets).map_err(aborted)?;
+            run.follow(&body.vertices, dt).map_err(aborted)?;
             if recording.is_closed() {
                 publisher.expect(1 + recording.len());
             }
-            last.number += 1;
-            let positions = solver.state().positions();
-            let flow = publisher.publish(&positions, Some(body.exposure));
-            if flow.is_break() {
-                last.captured_ns = body.exposure.capture_time_ns;
-                last.checkpoint = solver.checkpoint(u64::from(last.number));
-                return Ok(flow);
+            number += 1;
+            if publish(&run, publisher, body.exposure).is_break() {
+                self.last = Some(LastFrame::of(&run, number, body.exposure));
+                return Ok(ControlFlow::Break(()));
             }
         }
         publisher.expect(0);
         Ok(ControlFlow::Continue(()))
     }
+}
+
+/// Publishes the cloth of a run.
+fn publish(run: &OfflineRun<'_>, publisher: &mut Publisher, exposure: FrameId) -> ControlFlow<()> {
+    publisher.publish(&run.solver().state().positions(), Some(exposure))
 }
 
 fn drape_step(vertices: usize, step: &DrapeReport) -> DrapeStep {

@@ -13,17 +13,15 @@ use std::ops::ControlFlow;
 use std::path::Path;
 use std::process::ExitCode;
 use std::time::Instant;
-use tryon::cloth::fine::{
-    FrameTargets, OfflineFrameReport, OfflineSolver, OfflineState, checkpoint_frame,
-};
+use tryon::cloth::fine::{OfflineFrameReport, checkpoint_frame};
 use tryon::formats::gltf::{GlbMesh, write_glb_motion};
 use tryon::formats::image::write_png_rgb;
 use tryon::geometry::camera::ColorImage;
-use tryon::geometry::math::{P3, V3d};
+use tryon::geometry::math::P3;
 use tryon::geometry::par::{Par, with_threads};
 use tryon::mirror::{
-    DressedOutfit, FrameClock, MirrorError, OfflineDrapeReport, OfflineOutfit, OutfitPainter,
-    time_step,
+    DressedOutfit, FrameClock, MirrorError, OfflineDrapeReport, OfflineOutfit, OfflineRun,
+    OutfitPainter, time_step,
 };
 
 /// Nominal time between frames of the animation (s).
@@ -70,12 +68,17 @@ pub(crate) fn run(args: &RunArgs) -> Result<ExitCode> {
             sizes: preview.mirror.notes().to_vec(),
             ..Report::default()
         };
-        let is_whole = if preview.is_still() || args.fine.still.is_some() {
-            drape(args, &preview, &outfit, &dressed, &mut report)
-        } else {
-            Animation::start(args, &outfit, &preview, &dressed, &mut report)
-                .and_then(|mut animation| animation.run(&mut preview, &dressed, &mut report))
-        }?;
+        let is_still = preview.is_still() || args.fine.still.is_some();
+        if is_still {
+            check_still(args)?;
+            picture(&args.out, dressed.index, "_preview", &dressed.seen.picture)?;
+        }
+        let mut animation = Animation::start(args, &outfit, &preview, &dressed, &mut report)?;
+        let flow = match is_still {
+            true => animation.files.flow(),
+            false => animation.run(&mut preview, &dressed, &mut report)?,
+        };
+        animation.finish(&preview, &mut report)?;
         report.peak_memory_bytes = peak_memory();
         write(&args.out.join("report.json"), &report)?;
         report.sizes.iter().for_each(|note| println!("{note}"));
@@ -84,7 +87,7 @@ pub(crate) fn run(args: &RunArgs) -> Result<ExitCode> {
             "{frames} frames of {} vertices, pictures, positions.npy, body.npy, outfit.glb and report.json in {out}",
             outfit.cloth().len()
         );
-        Ok(if is_whole {
+        Ok(if flow.is_continue() {
             ExitCode::SUCCESS
         } else {
             ExitCode::from(INTERRUPTED)
@@ -163,110 +166,18 @@ fn picture(out: &Path, index: usize, kind: &str, picture: &ColorImage) -> Result
     Ok(write_png_rgb(&path, picture)?)
 }
 
-/// Picture of a frame with the cloth of the solver.
-fn fine_picture(
-    preview: &Preview,
-    painter: &mut OutfitPainter,
-    frame: &PreviewFrame,
-    outfit: &OfflineOutfit,
-    solver: &OfflineSolver<'_>,
-) -> Result<ColorImage> {
-    let state = solver.state();
-    let surfaces = [state.positions(), state.obstacle_positions()];
-    let surfaces = [&surfaces[0][..], &surfaces[1]];
-    Ok((preview.mirror).picture_of(painter, &frame.frame, outfit, surfaces)?)
-}
-
-/// Drapes the outfit in the pose of one frame; false after Ctrl-C.
-fn drape(
-    args: &RunArgs,
-    preview: &Preview,
-    outfit: &OfflineOutfit,
-    frame: &PreviewFrame,
-    report: &mut Report,
-) -> Result<bool> {
+/// Refuses a checkpoint for a drape in one pose.
+fn check_still(args: &RunArgs) -> Result<()> {
     if args.solver.checkpoint.is_some() {
         bail!("a drape takes seconds and has no checkpoint");
     }
-    picture(&args.out, frame.index, "_preview", &frame.seen.picture)?;
-    let mut files = OfflineFiles::open(&args.solver, &args.out, counts(preview, outfit), 0)?;
-    let (state, done) = settle(outfit, worn(preview)?, || files.flow())?;
-    report.drape = done;
-    let solver = outfit.solver(state, Par::Rayon)?;
-    start(&mut files, &solver)?;
-    let mut painter = OutfitPainter::new(input::template(args.body.as_deref())?);
-    let fine = fine_picture(preview, &mut painter, frame, outfit, &solver)?;
-    picture(&args.out, frame.index, "", &fine)?;
-    finish(args, preview, outfit, &mut files, report)?;
-    Ok(files.flow().is_continue())
-}
-
-/// Vertices of the cloth and of the body.
-fn counts(preview: &Preview, outfit: &OfflineOutfit) -> (usize, Option<usize>) {
-    let body = preview.mirror.template().mesh().vertices().len();
-    (outfit.cloth().len(), Some(body))
-}
-
-/// Adds the start to the files.
-fn start(files: &mut OfflineFiles, solver: &OfflineSolver<'_>) -> Result<()> {
-    let state = solver.state();
-    files.push(&state.positions(), &state.obstacle_positions())
-}
-
-/// Writes outfit.glb of all frames: each garment, and the body.
-fn finish(
-    args: &RunArgs,
-    preview: &Preview,
-    outfit: &OfflineOutfit,
-    files: &mut OfflineFiles,
-    report: &mut Report,
-) -> Result<()> {
-    let frames = files.read()?;
-    report.frames = frames.len();
-    let mut motion: Vec<Vec<Vec<P3>>> = vec![Vec::new(); outfit.garments().len()];
-    for frame in &frames {
-        for (all, drawn) in motion.iter_mut().zip(outfit.drawn_positions(frame)) {
-            all.push(drawn);
-        }
-    }
-    motion.push(files.read_body()?);
-    let colors = preview.mirror.appearances().iter().map(|a| a.base);
-    let garments = outfit.garments().iter().zip(colors);
-    let surfaces = garments
-        .map(|(g, color)| {
-            (
-                g.name.as_str(),
-                &g.render.faces[..],
-                &g.render.uv[..],
-                color,
-            )
-        })
-        .chain([(
-            "body",
-            preview.mirror.template().mesh().faces(),
-            &[][..],
-            SKIN,
-        )]);
-    let meshes: Vec<GlbMesh<'_>> = (surfaces.zip(&motion))
-        .map(|((name, faces, uv, color), motion)| GlbMesh {
-            name,
-            vertices: motion.first().map_or(&[][..], Vec::as_slice),
-            faces,
-            uv,
-            color,
-            texture: &[],
-        })
-        .collect();
-    let motion = if frames.len() > 1 { &motion[..] } else { &[] };
-    write_glb_motion(&args.out.join("outfit.glb"), &meshes, motion, INTERVAL)?;
     Ok(())
 }
 
-/// Simulation of the frames after the first dressed one.
+/// Cloth at the first dressed frame and after it.
 struct Animation<'a> {
     args: &'a RunArgs,
-    outfit: &'a OfflineOutfit,
-    solver: OfflineSolver<'a>,
+    simulation: OfflineRun<'a>,
     files: OfflineFiles,
     painter: OutfitPainter,
     /// Frames after the first one that an earlier run computed.
@@ -288,46 +199,51 @@ impl<'a> Animation<'a> {
         let known = saved.as_deref().map(checkpoint_frame).transpose()?;
         let resumed = known.unwrap_or(0) as usize;
         let frames = known.map_or(0, |_| resumed + 1);
-        let counts = counts(preview, outfit);
-        let mut files = OfflineFiles::open(&args.solver, &args.out, counts, frames)?;
-        let solver = match &saved {
-            Some(bytes) => outfit.resumed_solver(bytes, Par::Rayon)?,
+        let body = preview.mirror.template().mesh().vertices().len();
+        let counts = (outfit.cloth().len(), Some(body));
+        let files = OfflineFiles::open(&args.solver, &args.out, counts, frames)?;
+        let simulation = match &saved {
+            Some(bytes) => OfflineRun::resumed(outfit, bytes, Par::Rayon)?,
             None => {
-                let (state, done) = settle(outfit, worn(preview)?, || files.flow())?;
+                let (run, done) = settle(outfit, worn(preview)?, || files.flow())?;
                 report.drape = done;
-                let solver = outfit.solver(state, Par::Rayon)?;
-                start(&mut files, &solver)?;
-                solver
+                run
             }
         };
         let mut out = Self {
             args,
-            outfit,
-            solver,
+            simulation,
             files,
             painter: OutfitPainter::new(input::template(args.body.as_deref())?),
             resumed,
             is_lost: false,
         };
         if saved.is_none() {
-            let (painter, solver) = (&mut out.painter, &out.solver);
-            let fine = fine_picture(preview, painter, first, outfit, solver)?;
-            picture(&args.out, first.index, "", &fine)?;
+            let state = out.simulation.solver().state();
+            (out.files).push(&state.positions(), &state.obstacle_positions())?;
+            out.picture(preview, first)?;
         }
         Ok(out)
     }
 
-    /// Simulates to the end of the recording, or to the end of the frame in work after Ctrl-C: false then.
+    /// Writes the picture of a frame with the simulated cloth.
+    fn picture(&mut self, preview: &Preview, frame: &PreviewFrame) -> Result<()> {
+        let mirror = &preview.mirror;
+        let fine = mirror.picture_of(&mut self.painter, &frame.frame, &self.simulation)?;
+        picture(&self.args.out, frame.index, "", &fine)
+    }
+
+    /// Simulates to the end of the recording; breaks at the end of the frame in work after Ctrl-C.
     fn run(
         &mut self,
         preview: &mut Preview,
         first: &PreviewFrame,
         report: &mut Report,
-    ) -> Result<bool> {
+    ) -> Result<ControlFlow<()>> {
         let left = preview.total.map(|n| (n - 1 - first.index) as u64);
         let bar = input::progress(left, "simulating");
         let mut clock = FrameClock::at(first.frame.time_ns);
-        let (mut done, mut is_whole) = (0, true);
+        let (mut done, mut flow) = (0, ControlFlow::Continue(()));
         while let Some(frame) = preview.next()? {
             done += 1;
             let dt = time_step(clock.gap(frame.frame.time_ns));
@@ -340,14 +256,13 @@ impl<'a> Animation<'a> {
             self.frame(preview, &frame, dt, report)
                 .with_context(|| format!("frame {}", frame.index))?;
             bar.inc(1);
-            if self.files.frame(&self.solver)?.is_break() {
-                is_whole = false;
+            flow = self.files.frame(self.simulation.solver())?;
+            if flow.is_break() {
                 break;
             }
         }
         bar.finish_and_clear();
-        finish(self.args, preview, self.outfit, &mut self.files, report)?;
-        Ok(is_whole)
+        Ok(flow)
     }
 
     /// Simulates one frame and writes its picture.
@@ -358,32 +273,74 @@ impl<'a> Animation<'a> {
         dt: f64,
         report: &mut Report,
     ) -> Result<()> {
-        let out = &self.args.out;
         if !frame.seen.is_dressed {
             self.is_lost = true;
             report.waited.push(frame.index);
-            return picture(out, frame.index, "", &frame.seen.picture);
+            return picture(&self.args.out, frame.index, "", &frame.seen.picture);
         }
         let worn = worn(preview)?;
         if std::mem::take(&mut self.is_lost) {
-            let (state, _) = settle(self.outfit, worn, || self.files.flow())?;
-            self.solver = self.outfit.solver(state, Par::Rayon)?;
+            let outfit = self.simulation.outfit();
+            (self.simulation, _) = settle(outfit, worn, || self.files.flow())?;
         }
         let started = Instant::now();
-        let work = advance(self.outfit, &mut self.solver, worn, dt)?;
+        let body = worn.state.collision_body().vertices();
+        let work = self.simulation.follow(body, dt)?;
         report.work.push((work, started.elapsed().as_secs_f64()));
-        let (painter, solver) = (&mut self.painter, &self.solver);
-        let fine = fine_picture(preview, painter, frame, self.outfit, solver)?;
-        picture(out, frame.index, "", &fine)
+        self.picture(preview, frame)
+    }
+
+    /// Writes outfit.glb of all frames: each garment, and the body.
+    fn finish(&mut self, preview: &Preview, report: &mut Report) -> Result<()> {
+        let outfit = self.simulation.outfit();
+        let frames = self.files.read()?;
+        report.frames = frames.len();
+        let mut motion: Vec<Vec<Vec<P3>>> = vec![Vec::new(); outfit.garments().len()];
+        for frame in &frames {
+            for (all, drawn) in motion.iter_mut().zip(outfit.drawn_positions(frame)) {
+                all.push(drawn);
+            }
+        }
+        motion.push(self.files.read_body()?);
+        let colors = preview.mirror.appearances().iter().map(|a| a.base);
+        let garments = outfit.garments().iter().zip(colors);
+        let surfaces = garments
+            .map(|(g, color)| {
+                (
+                    g.name.as_str(),
+                    &g.render.faces[..],
+                    &g.render.uv[..],
+                    color,
+                )
+            })
+            .chain([(
+                "body",
+                preview.mirror.template().mesh().faces(),
+                &[][..],
+                SKIN,
+            )]);
+        let meshes: Vec<GlbMesh<'_>> = (surfaces.zip(&motion))
+            .map(|((name, faces, uv, color), motion)| GlbMesh {
+                name,
+                vertices: motion.first().map_or(&[][..], Vec::as_slice),
+                faces,
+                uv,
+                color,
+                texture: &[],
+            })
+            .collect();
+        let motion = if frames.len() > 1 { &motion[..] } else { &[] };
+        write_glb_motion(&self.args.out.join("outfit.glb"), &meshes, motion, INTERVAL)?;
+        Ok(())
     }
 }
 
 /// Static drape from the preview, which leaves the cloth under stress by the offline fabric and contact. `flow` breaks off.
-fn settle(
-    outfit: &OfflineOutfit,
+fn settle<'a>(
+    outfit: &'a OfflineOutfit,
     worn: &DressedOutfit,
     flow: impl Fn() -> ControlFlow<()>,
-) -> Result<(OfflineState, OfflineDrapeReport)> {
+) -> Result<(OfflineRun<'a>, OfflineDrapeReport)> {
     let bar = input::progress(None, "draping");
     let done = outfit.drape(worn, Par::Rayon, |vertices, step| {
         bar.set_message(format!(
@@ -395,20 +352,4 @@ fn settle(
     })?;
     bar.finish_and_clear();
     Ok(done)
-}
-
-/// One frame: the body moves evenly to where the preview has it.
-fn advance(
-    outfit: &OfflineOutfit,
-    solver: &mut OfflineSolver<'_>,
-    worn: &DressedOutfit,
-    dt: f64,
-) -> Result<OfflineFrameReport> {
-    let body = worn.state.collision_body().vertices();
-    let obstacle: Vec<V3d> = body.iter().map(|p| p.coords.cast()).collect();
-    let targets = FrameTargets {
-        pins: &outfit.pins(body),
-        obstacle: &obstacle,
-    };
-    Ok(solver.advance(dt, &targets)?)
 }
