@@ -1,11 +1,11 @@
 //! Ratio of two decimal integers of any length, correctly rounded to f64.
 
+use num_bigint::BigInt;
+use num_rational::Ratio;
+use num_traits::{ToPrimitive, Zero};
+
 /// Decimal digits of one integer. More than the exact quotients of any two f64 need.
 const MAX_DIGITS: usize = 2048;
-/// Bits of the integer quotient: 53 of the significand, and at least two for rounding.
-const QUOTIENT_BITS: i64 = 55;
-/// Powers of two within which quotients are normal numbers.
-const MAX_SHIFT: i64 = 960;
 
 /// Nearest f64 of a rational number, ties to even.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -20,150 +20,37 @@ pub(super) struct Rounded {
 /// # Errors
 /// The fault, when one isn't an integer, the denominator isn't positive, or the quotient is beyond the range of f64.
 pub(super) fn round_ratio(numerator: &str, denominator: &str) -> Result<Rounded, String> {
-    let (is_negative, digits) = match numerator.strip_prefix('-') {
-        Some(digits) => (true, digits),
-        None => (false, numerator),
-    };
-    let (n, d) = (magnitude(digits)?, magnitude(denominator)?);
-    if d.is_empty() {
+    let digits = numerator.strip_prefix('-');
+    let mut n = magnitude(digits.unwrap_or(numerator))?;
+    if digits.is_some() {
+        n = -n;
+    }
+    let d = magnitude(denominator)?;
+    if d.is_zero() {
         return Err("the denominator is 0".to_owned());
     }
-    let magnitude = round_quotient(n, d)?;
+
+    // Reduced or not, the value is the same.
+    let ratio = Ratio::new_raw(n, d);
+    let beyond = || "the quotient is beyond the range of f64".to_owned();
+    let value = ratio.to_f64().filter(|v| v.is_normal() || ratio.is_zero());
+    let value = value.ok_or_else(beyond)?;
+    let rounded = Ratio::<BigInt>::from_float(value).ok_or_else(beyond)?;
     Ok(Rounded {
-        value: if is_negative {
-            -magnitude.value
-        } else {
-            magnitude.value
-        },
-        ..magnitude
+        value,
+        is_exact: rounded.numer() * ratio.denom() == ratio.numer() * rounded.denom(),
     })
 }
 
-/// Binary magnitude, least significant word first, without leading zeros.
-type Words = Vec<u32>;
-
-fn magnitude(digits: &str) -> Result<Words, String> {
+fn magnitude(digits: &str) -> Result<BigInt, String> {
     let is_number = !digits.is_empty() && digits.bytes().all(|b| b.is_ascii_digit());
-    if !is_number || digits.len() > MAX_DIGITS {
+    let short = Some(digits).filter(|d| is_number && d.len() <= MAX_DIGITS);
+    short.and_then(|d| d.parse().ok()).ok_or_else(|| {
         let shown: String = digits.chars().take(24).collect();
-        return Err(format!(
+        format!(
             "`{shown}` is not an integer (the denominator unsigned) of at most {MAX_DIGITS} digits"
-        ));
-    }
-    let mut words = Words::new();
-    for b in digits.bytes() {
-        let mut carry = u64::from(b - b'0');
-        for w in &mut words {
-            carry += u64::from(*w) * 10;
-            *w = carry as u32;
-            carry >>= 32;
-        }
-        if carry > 0 {
-            words.push(carry as u32);
-        }
-    }
-    Ok(words)
-}
-
-/// The value if f64 holds it exactly.
-fn exact_f64(words: &[u32]) -> Option<f64> {
-    let value = words
-        .iter()
-        .rev()
-        .fold(0u128, |v, w| v << 32 | u128::from(*w));
-    (words.len() <= 3 && value as f64 as u128 == value).then_some(value as f64)
-}
-
-fn round_quotient(n: Words, d: Words) -> Result<Rounded, String> {
-    if n.is_empty() {
-        return Ok(Rounded {
-            value: 0.0,
-            is_exact: true,
-        });
-    }
-    if let (Some(n), Some(d)) = (exact_f64(&n), exact_f64(&d)) {
-        let value = n / d;
-        let is_exact = value.mul_add(d, -n) == 0.0;
-        return Ok(Rounded { value, is_exact });
-    }
-    divide(n, d)
-}
-
-/// Integer division with a sticky bit for the remainder.
-fn divide(mut n: Words, mut d: Words) -> Result<Rounded, String> {
-    let shift = QUOTIENT_BITS - (bits(&n) - bits(&d));
-    if shift.abs() > MAX_SHIFT {
-        return Err("the quotient is beyond the range of f64".to_owned());
-    }
-    shift_left(&mut n, shift.max(0) as usize);
-    shift_left(&mut d, (-shift).max(0) as usize + QUOTIENT_BITS as usize);
-    let mut quotient = 0u64;
-    for _ in 0..=QUOTIENT_BITS {
-        quotient <<= 1;
-        if is_less_or_equal(&d, &n) {
-            subtract(&mut n, &d);
-            quotient |= 1;
-        }
-        halve(&mut d);
-    }
-    let is_exact = n.iter().all(|w| *w == 0) && (quotient as f64) as u64 == quotient;
-    let sticky = u64::from(!n.iter().all(|w| *w == 0));
-    Ok(Rounded {
-        value: (quotient | sticky) as f64 * 2f64.powi(-shift as i32),
-        is_exact,
+        )
     })
-}
-
-fn bits(words: &[u32]) -> i64 {
-    let top = words
-        .last()
-        .map_or(0, |w| 32 - i64::from(w.leading_zeros()));
-    (words.len().max(1) as i64 - 1) * 32 + top
-}
-
-fn shift_left(words: &mut Words, by: usize) {
-    let mut carry = 0u64;
-    for w in words.iter_mut() {
-        carry |= u64::from(*w) << (by % 32);
-        *w = carry as u32;
-        carry >>= 32;
-    }
-    words.push(carry as u32);
-    words.splice(0..0, std::iter::repeat_n(0, by / 32));
-    trim(words);
-}
-
-fn halve(words: &mut Words) {
-    let mut high = 0;
-    for w in words.iter_mut().rev() {
-        let low = *w & 1;
-        *w = *w >> 1 | high << 31;
-        high = low;
-    }
-    trim(words);
-}
-
-fn trim(words: &mut Words) {
-    while words.last() == Some(&0) {
-        words.pop();
-    }
-}
-
-fn is_less_or_equal(a: &[u32], b: &[u32]) -> bool {
-    let order = a.len().cmp(&b.len());
-    order
-        .then_with(|| a.iter().rev().cmp(b.iter().rev()))
-        .is_le()
-}
-
-fn subtract(a: &mut Words, b: &[u32]) {
-    let mut borrow = 0i64;
-    for (i, w) in a.iter_mut().enumerate() {
-        borrow += i64::from(*w) - i64::from(b.get(i).copied().unwrap_or(0));
-        *w = borrow as u32;
-        borrow >>= 32;
-    }
-    trim(a);
 }
 
 #[cfg(test)]
@@ -215,24 +102,11 @@ mod tests {
         let mut random = rand_pcg::Pcg64Mcg::seed_from_u64(1);
         for _ in 0..500 {
             let (n, d) = (random.random::<u128>() >> 60, random.random::<u64>() >> 11);
-            // Times 3^80 in decimal is too long for the short path.
-            let long = |v: u128| {
-                let mut words = magnitude(&v.to_string()).expect("a number");
-                for _ in 0..120 {
-                    let mut carry = 0u64;
-                    for w in &mut words {
-                        carry += u64::from(*w) * 3;
-                        *w = carry as u32;
-                        carry >>= 32;
-                    }
-                    words.extend((carry > 0).then_some(carry as u32));
-                }
-                words
-            };
-            let n = n & !0xffff; // exact in f64
-            let n = (n as f64) as u128;
-            let got = divide(long(n), long(u128::from(d))).expect("in range");
-            assert_eq!(got.value, n as f64 / d as f64);
+            let long = |v: u128| (BigInt::from(v) * BigInt::from(3).pow(120)).to_string();
+            let n = (n & !0xffff) as f64; // exact in f64
+            let d = u128::from(d.max(1));
+            let got = round_ratio(&long(n as u128), &long(d)).expect("in range");
+            assert_eq!(got.value, n / d as f64);
         }
     }
 

@@ -1,22 +1,26 @@
 //! Input of a target: named members, so that formats of several files (OBJ with MTL, a recording's folder) and containers
 //! (npz, glb, MCAP) are mutated inside and packed anew.
 
+use prost::Message;
 use std::fs;
 use std::io;
 use std::path::{Component, Path};
 
 /// One file, or one part of a container. The extension of its name selects the mutations.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, PartialEq, Eq, Message)]
 pub struct Member {
     /// Relative path.
+    #[prost(string, tag = 1)]
     pub name: String,
     /// Content.
+    #[prost(bytes = "vec", tag = 2)]
     pub bytes: Vec<u8>,
 }
 
-/// All members of an input, at least one in inputs of a campaign.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Bundle(pub Vec<Member>);
+/// All members of an input, at least one in inputs of a campaign; a message, for the file from which a supervisor recovers
+/// the input of a crash.
+#[derive(Clone, PartialEq, Eq, Message)]
+pub struct Bundle(#[prost(message, repeated, tag = 1)] pub Vec<Member>);
 
 impl Bundle {
     /// Bundle of one member.
@@ -85,33 +89,6 @@ impl Bundle {
         members.sort_by(|a, b| a.name.cmp(&b.name));
         Ok(Self(members))
     }
-
-    /// Bytes of the whole bundle, for the file from which a supervisor recovers the input of a crash.
-    pub fn encode(&self) -> Vec<u8> {
-        let mut out = Vec::with_capacity(self.size() + 64);
-        for m in &self.0 {
-            out.extend_from_slice(format!("{}\n{}\n", m.name, m.bytes.len()).as_bytes());
-            out.extend_from_slice(&m.bytes);
-        }
-        out
-    }
-
-    /// Inverse of [`Self::encode`]; `None` for other bytes.
-    pub fn decode(mut bytes: &[u8]) -> Option<Self> {
-        let mut members = Vec::new();
-        while !bytes.is_empty() {
-            let mut parts = bytes.splitn(3, |b| *b == b'\n');
-            let name = String::from_utf8(parts.next()?.to_vec()).ok()?;
-            let length: usize = std::str::from_utf8(parts.next()?).ok()?.parse().ok()?;
-            let (content, rest) = parts.next()?.split_at_checked(length)?;
-            members.push(Member {
-                name,
-                bytes: content.to_vec(),
-            });
-            bytes = rest;
-        }
-        Some(Self(members))
-    }
 }
 
 fn collect(folder: &Path, prefix: &str, members: &mut Vec<Member>) -> io::Result<()> {
@@ -136,13 +113,11 @@ mod tests {
     use super::*;
 
     #[test]
-    fn bundles_survive_files_and_bytes() {
+    fn bundles_survive_files() {
         let bundle = Bundle::of("a.json", *b"{}").and("sub/b.bin", [0, 10, 255]);
-        assert_eq!(Bundle::decode(&bundle.encode()), Some(bundle.clone()));
         let folder = tempfile::tempdir().expect("a folder");
         bundle.write_into(folder.path()).expect("written");
         assert_eq!(Bundle::read(folder.path()).expect("read"), bundle);
         assert!(Bundle::of("../a", []).write_into(folder.path()).is_err());
-        assert_eq!(Bundle::decode(b"a\n9\nshort"), None);
     }
 }

@@ -1,13 +1,15 @@
-//! Campaign against one target, in a process of its own: mutate, execute, keep what is new, save what fails.
+//! Campaign against one target, in a process of its own: mutate, execute, save what fails.
 
 use crate::bundle::Bundle;
 use crate::corpus;
 use crate::execute::{Execution, Scratch, Verdict, catch_panics, execute};
 use crate::mutate::Mutator;
-use crate::shrink::shrink;
+use crate::supervise::{FINDING, say};
 use crate::targets::Target;
 use anyhow::{Context, Result};
-use rand::{Rng, SeedableRng};
+use arbtest::arbtest;
+use prost::Message;
+use rand::SeedableRng;
 use rand_pcg::Pcg64Mcg;
 use std::collections::HashSet;
 use std::fs::File;
@@ -15,7 +17,7 @@ use std::os::unix::fs::FileExt;
 use std::path::Path;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, mpsc};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 /// Time for one input, beyond which it counts as endless: a thousand times a usual one, on a busy machine.
 pub const TIME_LIMIT: Duration = Duration::from_secs(10);
@@ -23,61 +25,31 @@ pub const TIME_LIMIT: Duration = Duration::from_secs(10);
 pub const EXIT_ENDLESS: i32 = 124;
 /// Stack of the decoding thread: that of Rust's threads, on which services decode.
 const STACK: usize = 2 << 20;
-/// Most inputs kept in memory.
-const MOST_KEPT: usize = 2000;
+/// Random bytes of an input: a parent, a donor and the start of the mutations (arbtest's least).
+const ENTROPY: u32 = 32;
 /// Most findings of a campaign; one fault has many inputs.
 const MOST_FINDINGS: usize = 10;
 
-/// Result of a campaign.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Tally {
+/// Work of a campaign so far.
+#[derive(Clone, Copy, Debug, Default)]
+struct Tally {
     /// Executed inputs.
-    pub inputs: u64,
-    /// Distinct outcomes.
-    pub outcomes: usize,
+    inputs: u64,
     /// Most bytes held by a decoder.
-    pub held: usize,
+    held: usize,
     /// Longest time of an input (ms).
-    pub slowest_ms: u64,
-    /// Distinct faults.
-    pub findings: usize,
-}
-
-impl Tally {
-    /// One line for the supervisor.
-    pub fn line(&self) -> String {
-        let Self {
-            inputs,
-            outcomes,
-            held,
-            slowest_ms,
-            findings,
-        } = self;
-        format!("tally {inputs} {outcomes} {held} {slowest_ms} {findings}")
-    }
-    /// Inverse of [`Self::line`].
-    pub fn parse(line: &str) -> Option<Self> {
-        let mut numbers = line.strip_prefix("tally ")?.split(' ');
-        let mut next = || numbers.next()?.parse::<u64>().ok();
-        Some(Self {
-            inputs: next()?,
-            outcomes: next()? as usize,
-            held: next()? as usize,
-            slowest_ms: next()?,
-            findings: next()? as usize,
-        })
-    }
+    slowest_ms: u128,
 }
 
 /// Runs for `time`; the input under way is always in the file `current`.
 ///
 /// # Errors
 /// The corpus, the scratch folder or `current` cannot be used.
-pub fn run(target: &'static Target, time: Duration, seed: u64, current: &Path) -> Result<Tally> {
+pub fn run(target: &'static Target, time: Duration, current: &Path) -> Result<()> {
     catch_panics();
     let current = File::create(current).context("the file of the current input")?;
     let watch = Watch::start()?;
-    let work = move || Campaign::new(target, seed, current, watch)?.run(time);
+    let work = move || Campaign::new(target, current, watch)?.run(time);
     std::thread::Builder::new()
         .stack_size(STACK)
         .spawn(work)?
@@ -118,102 +90,110 @@ impl Watch {
 
 struct Campaign {
     target: &'static Target,
-    rng: Pcg64Mcg,
     current: File,
     watch: Watch,
     scratch: Scratch,
-    kept: Vec<Bundle>,
-    outcomes: HashSet<String>,
     faults: HashSet<String>,
     tally: Tally,
 }
 
 impl Campaign {
-    fn new(target: &'static Target, seed: u64, current: File, watch: Watch) -> Result<Self> {
-        let mut kept = (target.seeds)();
-        kept.extend(corpus::load(target.name)?.into_iter().map(|(_, b)| b));
-        kept.retain(|b| !b.0.is_empty());
-        anyhow::ensure!(!kept.is_empty(), "{} has no seeds", target.name);
+    fn new(target: &'static Target, current: File, watch: Watch) -> Result<Self> {
         Ok(Self {
             target,
-            rng: Pcg64Mcg::seed_from_u64(seed),
             current,
             watch,
             scratch: Scratch::new()?,
-            kept,
-            outcomes: HashSet::new(),
             faults: HashSet::new(),
             tally: Tally::default(),
         })
     }
 
-    fn run(mut self, time: Duration) -> Result<Tally> {
-        let start = Instant::now();
+    fn run(mut self, time: Duration) -> Result<()> {
+        let mut valid = (self.target.seeds)();
+        valid.extend(corpus::load(self.target.name)?.into_iter().map(|(_, b)| b));
+        valid.retain(|b| !b.0.is_empty());
         // Twice: what is made on first use (tables, the embedded body) is no input's memory.
-        for seed in self.kept.clone() {
-            self.execute(&seed)?;
+        for seed in &valid {
+            self.execute(seed)?;
         }
-        for seed in self.kept.clone() {
+        for seed in &valid {
             self.try_input(seed)?;
         }
-        while start.elapsed() < time && self.faults.len() < MOST_FINDINGS {
-            let input = self.next_input();
-            self.try_input(input)?;
-        }
-        self.tally.outcomes = self.outcomes.len();
-        self.tally.findings = self.faults.len();
-        Ok(self.tally)
+
+        let mut done = Ok(());
+        arbtest(|u| {
+            let mut input = u.choose(&valid)?.clone();
+            let donor = u.choose(&valid)?;
+            let mut mutator = Mutator {
+                rng: Pcg64Mcg::seed_from_u64(u.arbitrary()?),
+                words: self.target.words,
+                longest: self.target.longest,
+            };
+            mutator.mutate(&mut input, donor);
+            if done.is_ok() {
+                done = self.try_input(&input);
+            }
+            Ok(())
+        })
+        .size_max(ENTROPY)
+        .budget(time)
+        .run();
+        done?;
+        say(&self.summary());
+        Ok(())
     }
 
-    fn next_input(&mut self) -> Bundle {
-        let (parent, donor) = (
-            self.rng.random_range(0..self.kept.len()),
-            self.rng.random_range(0..self.kept.len()),
-        );
-        let mut input = self.kept[parent].clone();
-        let mut mutator = Mutator {
-            rng: Pcg64Mcg::seed_from_u64(self.rng.random()),
-            words: self.target.words,
-            longest: self.target.longest,
-        };
-        mutator.mutate(&mut input, &self.kept[donor]);
-        input
+    fn summary(&self) -> String {
+        let Tally {
+            inputs,
+            held,
+            slowest_ms,
+        } = self.tally;
+        let (name, held, findings) = (self.target.name, held >> 10, self.faults.len());
+        format!(
+            "{name:<16} {inputs:>9} inputs {held:>8} KiB held {slowest_ms:>5} ms slowest {findings:>3} findings"
+        )
     }
 
     fn execute(&mut self, input: &Bundle) -> Result<Execution> {
-        let bytes = input.encode();
+        let bytes = input.encode_to_vec();
         self.current.set_len(0)?;
         self.current.write_all_at(&bytes, 0)?;
         self.watch.inputs.fetch_add(1, Ordering::Relaxed);
         Ok(execute(self.target, input, &self.scratch))
     }
 
-    fn try_input(&mut self, input: Bundle) -> Result<()> {
-        let done = self.execute(&input)?;
+    fn try_input(&mut self, input: &Bundle) -> Result<()> {
+        let Execution {
+            verdict,
+            held,
+            took,
+        } = self.execute(input)?;
         self.tally.inputs += 1;
-        self.tally.held = self.tally.held.max(done.held);
-        let ms = done.took.as_millis() as u64;
-        self.tally.slowest_ms = self.tally.slowest_ms.max(ms);
-        let is_new = self.outcomes.insert(done.verdict.signature());
-        if done.verdict.is_finding() {
-            if self.faults.insert(done.verdict.signature()) {
-                self.report(&done.verdict, input)?;
-            }
-        } else if is_new && self.kept.len() < MOST_KEPT {
-            self.kept.push(input);
+        self.tally.held = self.tally.held.max(held);
+        self.tally.slowest_ms = self.tally.slowest_ms.max(took.as_millis());
+        let Some(fault) = verdict
+            .fault()
+            .filter(|_| self.faults.len() < MOST_FINDINGS)
+        else {
+            return Ok(());
+        };
+        if self.faults.insert(fault.to_owned()) {
+            self.report(&verdict, input)?;
         }
         Ok(())
     }
 
-    fn report(&mut self, verdict: &Verdict, input: Bundle) -> Result<()> {
+    fn report(&self, verdict: &Verdict, input: &Bundle) -> Result<()> {
         let kind = match verdict {
             Verdict::Greedy { .. } => "greedy",
             _ => "panic",
         };
-        let small = shrink(self.target, input, &self.scratch);
-        let path = corpus::save(self.target.name, kind, &small)?;
-        let line = format!("finding {verdict:?} in {}", path.display());
-        crate::supervise::say(&line.replace('\n', " "));
+        let path = corpus::save(self.target.name, kind, input)?;
+        let (name, path) = (self.target.name, path.display());
+        let line = format!("{name}{FINDING}{verdict:?} in {path}");
+        say(&line.replace('\n', " "));
         Ok(())
     }
 }

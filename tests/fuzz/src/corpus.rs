@@ -1,6 +1,7 @@
 //! Kept inputs: `corpus/TARGET/NAME@member.ext` for one member, `corpus/TARGET/NAME/…` for several.
 
 use crate::bundle::Bundle;
+use prost::Message;
 use std::fs;
 use std::hash::{DefaultHasher, Hash, Hasher};
 use std::io;
@@ -38,7 +39,7 @@ pub fn load(target: &str) -> io::Result<Vec<(String, Bundle)>> {
 /// An error of the system.
 pub fn save(target: &str, kind: &str, bundle: &Bundle) -> io::Result<PathBuf> {
     let mut hasher = DefaultHasher::new();
-    bundle.encode().hash(&mut hasher);
+    bundle.encode_to_vec().hash(&mut hasher);
     let name = format!("{kind}-{:08x}", hasher.finish() as u32);
     let folder = folder(target);
     fs::create_dir_all(&folder)?;

@@ -79,21 +79,13 @@ pub enum Verdict {
 }
 
 impl Verdict {
-    /// The same for inputs that take the same way through a decoder: letters of the message, or the result's magnitude.
-    pub fn signature(&self) -> String {
+    /// Name of the fault, the same for all its inputs; `None` without one.
+    pub fn fault(&self) -> Option<&str> {
         match self {
-            Self::Fine(Ok(size)) => format!("ok {}", usize::BITS - size.leading_zeros()),
-            Self::Fine(Err(why)) => {
-                let letters = why.chars().filter(|c| c.is_alphabetic());
-                letters.take(80).collect()
-            }
-            Self::Panicked(place) => format!("panic {place}"),
-            Self::Greedy { .. } => "greedy".into(),
+            Self::Fine(_) => None,
+            Self::Panicked(place) => Some(place),
+            Self::Greedy { .. } => Some("greedy"),
         }
-    }
-    /// The decoder broke.
-    pub fn is_finding(&self) -> bool {
-        !matches!(self, Self::Fine(_))
     }
 }
 

@@ -1,9 +1,9 @@
-//! Fuzz targets for every decoder of outside data: structure-aware mutations of a kept corpus, on stable Rust.
+//! Fuzz targets for every decoder of outside data: structure-aware mutations of valid inputs, on stable Rust.
 //!
 //! A target is a decoder with seeds made by our own writers ([`targets`]). A campaign mutates seeds and corpus
-//! ([`mutate`]), keeps inputs whose outcome is new, and fails on a panic, on memory beyond the target's allowance per input
-//! byte, on an abort, and on a time-out. Failing inputs are shrunk and saved under `corpus/TARGET`, where
-//! `tests/regressions.rs` replays them.
+//! ([`mutate`]) by random numbers of `arbtest`, and fails on a panic, on memory beyond the target's allowance per input
+//! byte, on an abort, and on a time-out. Failing inputs are saved under `corpus/TARGET`, where `tests/regressions.rs`
+//! replays them.
 
 pub mod bundle;
 pub mod campaign;
@@ -11,7 +11,6 @@ pub mod corpus;
 pub mod execute;
 pub mod mutate;
 mod pack;
-pub mod shrink;
 pub mod supervise;
 pub mod targets;
 

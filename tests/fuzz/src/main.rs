@@ -21,9 +21,6 @@ struct Args {
     /// Targets at a time.
     #[arg(long, default_value_t = 2)]
     jobs: usize,
-    /// Start of the random numbers; the same start makes the same inputs.
-    #[arg(long, default_value_t = 1)]
-    seed: u64,
     /// Names the targets and ends.
     #[arg(long)]
     list: bool,
@@ -50,8 +47,7 @@ fn main() -> Result<ExitCode> {
         return Ok(ExitCode::SUCCESS);
     }
     if let (Some(name), Some(current)) = (&args.campaign, &args.current) {
-        let tally = campaign::run(find(name)?, time, args.seed, current)?;
-        say(&tally.line());
+        campaign::run(find(name)?, time, current)?;
         return Ok(ExitCode::SUCCESS);
     }
     let targets = if args.targets.is_empty() {
@@ -63,7 +59,6 @@ fn main() -> Result<ExitCode> {
     let plan = Plan {
         time,
         jobs: args.jobs,
-        seed: args.seed,
     };
     let findings = supervise::run(&targets, plan)?;
     say(&format!("{} targets, {findings} findings", targets.len()));

@@ -1,10 +1,11 @@
 //! Supervisor: one process for each campaign, so that aborts, exhausted stacks and endless inputs are findings too.
 
 use crate::bundle::Bundle;
-use crate::campaign::{EXIT_ENDLESS, Tally};
+use crate::campaign::EXIT_ENDLESS;
 use crate::corpus;
 use crate::targets::Target;
 use anyhow::{Context, Result};
+use prost::Message;
 use std::path::Path;
 use std::process::{Command, Output, Stdio};
 use std::sync::Mutex;
@@ -13,6 +14,9 @@ use std::time::{Duration, Instant};
 
 /// Address space of a campaign (KiB): a decoder that wants more aborts, and is found.
 const ADDRESS_SPACE_KIB: u64 = 8 << 20;
+
+/// Mark of a line that reports a finding, between the target's name and the fault.
+pub(crate) const FINDING: &str = ": finding ";
 
 /// Writes a line to standard output.
 #[expect(clippy::print_stdout)]
@@ -27,8 +31,6 @@ pub struct Plan {
     pub time: Duration,
     /// Campaigns at a time.
     pub jobs: usize,
-    /// Start of the random numbers.
-    pub seed: u64,
 }
 
 /// Runs campaigns against all `targets` and returns the number of findings.
@@ -61,29 +63,25 @@ fn supervise(target: &'static Target, plan: Plan) -> Result<usize> {
     let folder = tempfile::tempdir()?;
     let current = folder.path().join("current");
     let start = Instant::now();
-    let mut crashes = 0;
+    let (mut crashes, mut findings) = (0, 0);
     loop {
         let left = plan.time.saturating_sub(start.elapsed());
-        let seed = plan.seed + crashes as u64;
-        let output = campaign(target, left, seed, &current)?;
+        let output = campaign(target, left, &current)?;
         let text = String::from_utf8_lossy(&output.stdout);
-        for line in text.lines().filter(|l| l.starts_with("finding ")) {
-            say(&format!("{}: {line}", target.name));
-        }
-        if let Some(tally) = text.lines().find_map(Tally::parse) {
-            let findings = tally.findings + crashes;
-            say(&summary(target, tally, findings));
+        text.lines().for_each(say);
+        findings += text.matches(FINDING).count();
+        if output.status.success() {
             return Ok(findings);
         }
-        crashes += 1;
+        (crashes, findings) = (crashes + 1, findings + 1);
         report_crash(target, &output, &current)?;
         if crashes >= 3 || left.is_zero() {
-            return Ok(crashes);
+            return Ok(findings);
         }
     }
 }
 
-fn campaign(target: &Target, time: Duration, seed: u64, current: &Path) -> Result<Output> {
+fn campaign(target: &Target, time: Duration, current: &Path) -> Result<Output> {
     let program = std::env::current_exe().context("the path of this program")?;
     let limited = format!("ulimit -v {ADDRESS_SPACE_KIB}; exec \"$0\" \"$@\"");
     Command::new("sh")
@@ -91,7 +89,6 @@ fn campaign(target: &Target, time: Duration, seed: u64, current: &Path) -> Resul
         .arg(program)
         .args(["--campaign", target.name])
         .args(["--seconds", &time.as_secs_f64().to_string()])
-        .args(["--seed", &seed.to_string()])
         .arg("--current")
         .arg(current)
         .stdin(Stdio::null())
@@ -108,32 +105,17 @@ fn report_crash(target: &Target, output: &Output, current: &Path) -> Result<()> 
     let errors = String::from_utf8_lossy(&output.stderr);
     let tail: Vec<&str> = errors.lines().rev().take(3).collect();
     let bytes = std::fs::read(current).unwrap_or_default();
-    let saved = match Bundle::decode(&bytes) {
-        Some(input) => corpus::save(target.name, kind, &input)?
+    let saved = match Bundle::decode(&bytes[..]) {
+        Ok(input) if !input.0.is_empty() => corpus::save(target.name, kind, &input)?
             .display()
             .to_string(),
-        None => "(its input is unknown)".into(),
+        _ => "(its input is unknown)".into(),
     };
     let status = output.status;
     say(&format!(
-        "{}: finding {kind} ({status}) in {saved}: {}",
+        "{}{FINDING}{kind} ({status}) in {saved}: {}",
         target.name,
         tail.join(" | ")
     ));
     Ok(())
-}
-
-fn summary(target: &Target, tally: Tally, findings: usize) -> String {
-    let Tally {
-        inputs,
-        outcomes,
-        held,
-        slowest_ms,
-        ..
-    } = tally;
-    format!(
-        "{:<16} {inputs:>9} inputs {outcomes:>5} outcomes {:>8} KiB held {slowest_ms:>5} ms slowest {findings:>3} findings",
-        target.name,
-        held >> 10
-    )
 }

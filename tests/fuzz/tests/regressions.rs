@@ -27,7 +27,7 @@ fn kept_inputs_stay_harmless_and_seeds_are_decoded() {
         inputs = corpus::load(target.name).expect("a corpus");
         for (name, input) in &inputs {
             let verdict = execute(target, input, &scratch).verdict;
-            if verdict.is_finding() {
+            if verdict.fault().is_some() {
                 faults.push(format!("{} {name}: {verdict:?}", target.name));
             }
         }

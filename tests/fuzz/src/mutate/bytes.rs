@@ -5,7 +5,7 @@ use rand::Rng;
 use rand::seq::IndexedRandom;
 
 /// Integers at which sizes, offsets and signs break.
-pub(super) const INTEGERS: [u64; 18] = [
+const INTEGERS: [u64; 18] = [
     0,
     1,
     2,
@@ -27,7 +27,7 @@ pub(super) const INTEGERS: [u64; 18] = [
 ];
 
 /// Numbers at which arithmetic breaks.
-pub(super) const REALS: [f64; 12] = [
+const REALS: [f64; 12] = [
     0.0,
     -0.0,
     1.0,

@@ -1,6 +1,7 @@
 //! Mutations of protobuf messages, on their wire format and without their schema.
 
 use super::Mutator;
+use prost::encoding::{decode_varint, encode_varint};
 use rand::Rng;
 
 /// Value of a field.
@@ -78,19 +79,6 @@ impl Mutator<'_> {
     }
 }
 
-fn varint(b: &mut &[u8]) -> Option<u64> {
-    let mut n = 0;
-    for shift in (0..64).step_by(7) {
-        let (&byte, rest) = b.split_first()?;
-        *b = rest;
-        n |= u64::from(byte & 0x7f) << shift;
-        if byte < 0x80 {
-            return Some(n);
-        }
-    }
-    None
-}
-
 fn take<const N: usize>(b: &mut &[u8]) -> Option<[u8; N]> {
     let (head, rest) = b.split_first_chunk::<N>()?;
     *b = rest;
@@ -100,12 +88,12 @@ fn take<const N: usize>(b: &mut &[u8]) -> Option<[u8; N]> {
 fn parse(mut b: &[u8]) -> Option<Vec<Field>> {
     let mut fields = Vec::new();
     while !b.is_empty() {
-        let key = varint(&mut b)?;
+        let key = decode_varint(&mut b).ok()?;
         let value = match key & 7 {
-            0 => Value::Varint(varint(&mut b)?),
+            0 => Value::Varint(decode_varint(&mut b).ok()?),
             1 => Value::Fixed64(take(&mut b)?),
             2 => {
-                let length = usize::try_from(varint(&mut b)?).ok()?;
+                let length = usize::try_from(decode_varint(&mut b).ok()?).ok()?;
                 let (content, rest) = b.split_at_checked(length)?;
                 b = rest;
                 Value::Bytes(content.to_vec())
@@ -122,14 +110,6 @@ fn parse(mut b: &[u8]) -> Option<Vec<Field>> {
     Some(fields)
 }
 
-fn put_varint(out: &mut Vec<u8>, mut n: u64) {
-    while n > 0x7f {
-        out.push(n as u8 | 0x80);
-        n >>= 7;
-    }
-    out.push(n as u8);
-}
-
 fn write(fields: &[Field]) -> Vec<u8> {
     let mut out = Vec::new();
     for f in fields {
@@ -139,12 +119,12 @@ fn write(fields: &[Field]) -> Vec<u8> {
             Value::Bytes(_) => 2,
             Value::Fixed32(_) => 5,
         };
-        put_varint(&mut out, f.number << 3 | kind);
+        encode_varint(f.number << 3 | kind, &mut out);
         match &f.value {
-            Value::Varint(n) => put_varint(&mut out, *n),
+            Value::Varint(n) => encode_varint(*n, &mut out),
             Value::Fixed64(b) => out.extend_from_slice(b),
             Value::Bytes(b) => {
-                put_varint(&mut out, b.len() as u64);
+                encode_varint(b.len() as u64, &mut out);
                 out.extend_from_slice(b);
             }
             Value::Fixed32(b) => out.extend_from_slice(b),

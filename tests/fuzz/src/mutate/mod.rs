@@ -1,9 +1,7 @@
 //! Mutations of bundles, by the kind of each member.
 
 mod bytes;
-mod json;
 mod message;
-mod png;
 mod text;
 
 use crate::bundle::{Bundle, Member};
@@ -53,9 +51,7 @@ impl Mutator<'_> {
         let extension = member.name.rsplit('.').next().unwrap_or_default();
         match extension {
             "pb" => self.message(&mut member.bytes, donor),
-            "json" => self.json(&mut member.bytes, donor),
-            "png" => self.png(&mut member.bytes, donor),
-            "bin" | "npy" | "jpg" | "jpeg" | "tdz" | "npz" | "glb" | "mcap" | "gz" => {
+            "bin" | "npy" | "png" | "jpg" | "jpeg" | "tdz" | "npz" | "glb" | "mcap" | "gz" => {
                 self.bytes(&mut member.bytes, donor);
             }
             _ => self.text(&mut member.bytes, donor),

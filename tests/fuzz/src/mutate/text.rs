@@ -5,7 +5,7 @@ use rand::Rng;
 use rand::seq::IndexedRandom;
 
 /// Numbers that parsers, casts and sums break at.
-pub(super) const NUMBERS: [&str; 24] = [
+const NUMBERS: [&str; 24] = [
     "0",
     "1",
     "-1",

@@ -20,7 +20,7 @@ pub(super) const NPZ: Target = Target::new(
     |b, scratch| {
         let raw = b.get("body.npz");
         let archive = if raw.is_empty() {
-            pack::zip(&b.0)
+            pack::zip(&b.0)?
         } else {
             raw.to_vec()
         };
@@ -203,5 +203,6 @@ fn npz_seeds() -> Vec<Bundle> {
         .and("J_regressor.npy", f64s(&[2, 4], &[0.25; 8]))
         .and("shapedirs.npy", f64s(&[4, 3, 1], &[0.01; 12]))
         .and("posedirs.npy", f64s(&[4, 3, 9], &[0.0; 108]));
-    vec![Bundle::of("body.npz", pack::zip(&bundle.0)), bundle]
+    let archive = pack::zip(&bundle.0).unwrap_or_default();
+    vec![Bundle::of("body.npz", archive), bundle]
 }

@@ -127,7 +127,7 @@ pub(super) const GLTF: Target = Target::new(
         let raw = b.get("model.glb");
         let packed = match name {
             "model.glb" => raw.to_vec(),
-            _ => pack::glb(b.get("model.json"), b.get("model.bin")),
+            _ => pack::glb(b.get("model.json"), b.get("model.bin"))?,
         };
         let path = scratch.file("model.glb", &packed)?;
         let model = parse_gltf(&packed, &path).map(|m| m.parts.len());
