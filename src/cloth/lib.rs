@@ -31,8 +31,6 @@
 //! - Exchange between patches: [`mod@live::solver::explicit::halo`].
 //! - Eight floats at once: [`mod@live::solver::explicit::simd`].
 //! - XPBD: [`mod@live::solver::xpbd`].
-//! - Implicit Euler, BDF2: [`mod@live::integrators::implicit::quasi_newton`].
-//! - The paper's mass-spring step: [`mod@live::integrators::implicit::mass_spring`].
 //! - Skin contact: [`mod@live::contact::body_contact`].
 //! - Outer garments over inner ones: [`mod@live::contact::layer_height`], [`mod@live::contact::cloth_contact`].
 //! - Folds of one garment: [`mod@live::contact::self_contact`].
@@ -43,7 +41,6 @@
 //! - Sleeves off their arm: [`mod@live::repair::recover_sleeves`].
 //! - A body that teleports: [`mod@live::repair::teleport`].
 //! - The outfit as it was put on: [`mod@live::repair::reference`].
-//! - Scene files: [`mod@live::scene::file`].
 //!
 //! Elasticity of the offline solver:
 //!
@@ -69,17 +66,22 @@
 //! - Repair of a start: [`mod@fine::start`].
 //! - Static drape: [`mod@fine::drape`].
 //! - Whole animations: [`mod@fine::animation`], [`mod@fine::checkpoint`].
-//! - Of scene files: [`mod@fine::scene_run`].
 //! - Garments as one cloth: [`mod@fine::garment_cloth`].
+//!
+//! Scenes, one sheet among moving solids:
+//!
+//! - Files: [`mod@scene::file`].
+//! - By the live step: [`mod@scene::live_run`]; by the offline one: [`mod@scene::fine_run`].
 #![allow(rustdoc::private_intra_doc_links)] // the index of ideas names private modules
 
 pub mod contact;
 pub mod elastic;
 pub mod fine;
 pub mod live;
+pub mod scene;
 
 pub use live::{
     AnchorBinding, ClothError, Config, Element, GarmentState, Hinge, Input, Model, Outfit, Sheet,
-    StagesMs, State, StepReport, Workspace, WornReference, collision_model, model, scene,
-    self_contact, sleeve_rings, solver, step, untangler,
+    StagesMs, State, StepReport, Workspace, WornReference, collision_model, model, self_contact,
+    sleeve_rings, solver, step, untangler,
 };

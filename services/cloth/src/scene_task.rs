@@ -5,8 +5,8 @@ use bytes::Bytes;
 use std::ops::ControlFlow;
 use std::path::Path;
 use tonic::Status;
-use tryon::cloth::fine::{OfflineScene, OfflineSettings, checkpoint_frame};
-use tryon::cloth::scene::{self, RunConfig, Scene};
+use tryon::cloth::fine::{OfflineSettings, checkpoint_frame};
+use tryon::cloth::scene::{self, OfflineScene, Scene};
 use tryon::geometry::par::Par;
 use tryon_proto::convert::WireError;
 use tryon_proto::v1::{ClothSolver, StartSimulationRequest};
@@ -56,7 +56,7 @@ impl SceneTask {
         match self.solver {
             ClothSolver::Offline => self.offline(publisher),
             ClothSolver::Unspecified | ClothSolver::Realtime => {
-                scene::run(&self.scene, &RunConfig::default(), |_, x| {
+                scene::run(&self.scene, &self.scene.config(), |_, x| {
                     publisher.publish(x, None)
                 })
                 .map(drop)

@@ -12,7 +12,7 @@ use tryon_geometry::math::V3d;
 use tryon_geometry::mesh::Face;
 
 /// Laws of an orthotropic sheet of these moduli; bending is isotropic.
-pub(super) fn fabric_of(material: &Material) -> ElasticFabric {
+pub(crate) fn fabric_of(material: &Material) -> ElasticFabric {
     let strips = [material.stretch_weft, material.stretch_warp];
     // ν / (1 − ν²) = λ / √(E₁ E₂).
     let ratio = material.coupling / (strips[0] * strips[1]).sqrt();

@@ -48,6 +48,8 @@ pub struct Config {
     /// Skip queries of vertices that cannot have come near skin or folds since their last one.
     #[serde(rename = "skip_far")]
     pub cull_distant: bool,
+    /// Speed limit of cloth, m/s: keeps one bad frame from becoming many.
+    pub max_speed: f32,
     /// Mean displacement of the body in a step beyond which it has teleported, metres.
     pub teleport: f64,
     /// Threads.
@@ -75,6 +77,7 @@ impl Default for Config {
             untangle: 0.13,
             min_fold_ratio: 0.6,
             cull_distant: true,
+            max_speed: 12.0,
             teleport: 0.2,
             par: Par::Rayon,
         }
@@ -111,7 +114,7 @@ impl Config {
         self.offset * (order + 1) as f64 / count as f64
     }
     /// The body as cloth of these settings meets it: two layers fit between parts that press on each other.
-    pub(super) fn collision(&self) -> CollisionConfig {
+    pub(crate) fn collision(&self) -> CollisionConfig {
         CollisionConfig {
             noise_deadband: self.noise_deadband,
             clearance: (2.0 * self.offset + self.thickness) as f32,

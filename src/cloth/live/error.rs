@@ -37,9 +37,6 @@ pub enum ClothError {
         /// The fault.
         why: String,
     },
-    /// The system of equations could not be factored.
-    #[error("cloth system: {0}")]
-    Linear(#[from] tryon_geometry::linear::LinearError),
     /// The mesh is not a proper surface.
     #[error("cloth mesh: {0}")]
     Mesh(#[from] tryon_geometry::mesh::MeshError),

@@ -45,9 +45,13 @@ pub(super) struct GarmentModel {
 }
 
 impl GarmentModel {
-    /// Prepares a garment that lies at `offset` metres from the skin.
-    pub(super) fn new(g: &GarmentMesh, config: &Config, offset: f64) -> Result<Self, ClothError> {
-        let sheet = Sheet::of_garment(g)?;
+    /// Prepares a garment, the mechanical system `sheet`, that lies at `offset` metres from the skin.
+    pub(super) fn new(
+        g: &GarmentMesh,
+        sheet: Sheet,
+        config: &Config,
+        offset: f64,
+    ) -> Result<Self, ClothError> {
         let spec = substep(&sheet, config);
         let stable = StableSheet::new(&sheet, &spec);
         // A substep couples one ring, one more per degree of smoothing, and one more for bending.
@@ -111,7 +115,6 @@ fn substep(sheet: &Sheet, config: &Config) -> StepSpec {
     StepSpec {
         h,
         lookahead: config.force_lookahead,
-        springs_only: false,
         bending_interval: StableSheet::bending_interval(sheet, h),
         filter_degree: smooth,
     }

@@ -1,4 +1,4 @@
-//! One step of garment motion against a moving body, `filter → collide → solve → commit → sleep`: `model/` (sheet, membrane, bending, partition), `solver/` (kernels of the substeps), `contact/`, `sleep/`, `repair/`; `integrators/` (one sheet among moving solids, by several methods) for scene files.
+//! One step of garment motion against a moving body, `filter → collide → solve → commit → sleep`: `model/` (sheet, membrane, bending, partition), `solver/` (kernels of the substeps), `contact/`, `sleep/`, `repair/`.
 //!
 //! The real-time simulator follows Ye et al. 2014, section 4, "Near Realtime simulation".
 
@@ -9,14 +9,12 @@ mod config;
 pub(crate) mod contact;
 mod error;
 mod garment_model;
-pub mod integrators;
 pub mod model;
 mod outfit;
 mod outfit_model;
 mod patch;
 pub(crate) mod repair;
 mod report;
-pub mod scene;
 pub(crate) mod sleep;
 pub(crate) mod solve;
 pub mod solver;
@@ -33,7 +31,9 @@ pub use error::ClothError;
 pub use model::{Element, Hinge, Sheet};
 pub use outfit::{AnchorBinding, Outfit};
 pub use outfit_model::Model;
+pub(crate) use outfit_model::WornBody;
 pub use repair::reference::WornReference;
+pub(crate) use repair::sleeve_rings::Arms;
 pub use repair::{sleeve_rings, untangler};
 pub use report::{StagesMs, StepReport};
 pub use state::{GarmentState, State};

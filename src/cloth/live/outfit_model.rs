@@ -4,6 +4,7 @@ use super::collision::collision_model;
 use super::config::Config;
 use super::error::ClothError;
 use super::garment_model::GarmentModel;
+use super::model::Sheet;
 use super::model::partition::Partition;
 use super::outfit::{AnchorBinding, Outfit};
 use super::repair::sleeve_rings::Arms;
@@ -11,7 +12,19 @@ use super::sleep::island_model::skin_clusters;
 use crate::contact::{CollisionModel, MapView};
 use tryon_body::parts::vertex_masks;
 use tryon_body::{SkinWeights, Template};
+use tryon_garment::GarmentMesh;
 use tryon_geometry::par;
+
+/// Body of an outfit: its collision model, and what cloth that lost it returns by.
+#[derive(Debug)]
+pub(crate) struct WornBody {
+    pub(crate) collision: CollisionModel,
+    /// Centre lines that sleeves enclose.
+    pub(crate) arms: Arms,
+    /// Skin weights of its vertices, and the number of joints.
+    pub(crate) weights: SkinWeights,
+    pub(crate) joints: usize,
+}
 
 /// Everything immutable about an outfit on a body. Share it by `Arc`.
 #[derive(Debug)]
@@ -35,22 +48,41 @@ impl Model {
     /// # Errors
     /// Faults of the garments (triangle or edge named) or of the settings (field named).
     pub fn new(template: &Template, outfit: Outfit, config: Config) -> Result<Self, ClothError> {
-        config.check()?;
-        check_anchors(template, &outfit)?;
-        let mut garments: Vec<_> = outfit.garments.iter().map(|_| None).collect();
-        par::for_chunks(config.par, &mut garments, 1, |order, garment| {
-            let offset = config.layer_offset(order, outfit.garments.len());
-            garment[0] = Some(GarmentModel::new(&outfit.garments[order], &config, offset));
-        });
-        let garments = garments.into_iter().flatten().collect::<Result<_, _>>()?;
-        let collision = collision_model(template, &config)?;
-        let mut model = Self {
-            skin_clusters: skin_clusters(collision.surface()),
+        let body = WornBody {
+            collision: collision_model(template, &config)?,
             arms: Arms::new(template, &vertex_masks(template)),
             weights: template.weights().clone(),
             joints: template.skeleton().len(),
+        };
+        Self::on_body(body, outfit, config, Sheet::of_garment)
+    }
+    /// Prepares an outfit whose garments are these sheets on any body.
+    ///
+    /// # Errors
+    /// As [`Self::new`].
+    pub(crate) fn on_body(
+        body: WornBody,
+        outfit: Outfit,
+        config: Config,
+        sheet: impl Fn(&GarmentMesh) -> Result<Sheet, ClothError> + Sync,
+    ) -> Result<Self, ClothError> {
+        config.check()?;
+        check_anchors(body.collision.surface().vertices(), &outfit)?;
+        let mut garments: Vec<_> = outfit.garments.iter().map(|_| None).collect();
+        par::for_chunks(config.par, &mut garments, 1, |order, garment| {
+            let offset = config.layer_offset(order, outfit.garments.len());
+            let g = &outfit.garments[order];
+            garment[0] =
+                Some(sheet(g).and_then(|sheet| GarmentModel::new(g, sheet, &config, offset)));
+        });
+        let garments = garments.into_iter().flatten().collect::<Result<_, _>>()?;
+        let mut model = Self {
+            skin_clusters: skin_clusters(body.collision.surface()),
+            arms: body.arms,
+            weights: body.weights,
+            joints: body.joints,
             views: MapView::around(config.camera_toward, config.map_detail),
-            collision,
+            collision: body.collision,
             garments,
             outfit,
             config,
@@ -102,8 +134,8 @@ impl Model {
     }
 }
 
-/// Checks that there are anchors for every garment, of vertices that exist.
-fn check_anchors(template: &Template, outfit: &Outfit) -> Result<(), ClothError> {
+/// Checks that there are anchors for every garment, of vertices that exist; `body`: number of body vertices.
+fn check_anchors(body: usize, outfit: &Outfit) -> Result<(), ClothError> {
     if outfit.anchors.len() != outfit.garments.len() {
         return Err(ClothError::Count {
             what: "anchor lists",
@@ -111,7 +143,6 @@ fn check_anchors(template: &Template, outfit: &Outfit) -> Result<(), ClothError>
             expected: outfit.garments.len(),
         });
     }
-    let body = template.mesh().vertices().len();
     for (g, anchors) in outfit.garments.iter().zip(&outfit.anchors) {
         let is_faulty = |a: &&AnchorBinding| {
             a.vertex as usize >= g.vertices || a.body.iter().any(|v| *v as usize >= body)

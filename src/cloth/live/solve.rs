@@ -7,8 +7,6 @@ use super::patch::PatchWork;
 use super::solver::explicit::{Exemptions, FoldLimit, Substep, V4, run_substeps};
 use tryon_geometry::par;
 
-/// Speed limit of cloth, m/s: keeps one bad frame from becoming many.
-const MAX_SPEED: f32 = 12.0;
 /// Speed at which cloth below the skin comes out, m/s; faster, a body that closes on itself throws it.
 const BODY_RECOVERY: f32 = 1.0;
 /// The same for cloth on the wrong side of cloth, where the body may be in the way.
@@ -109,7 +107,8 @@ impl GarmentSolver<'_> {
             };
             p.motion.limit_speed(limit, &exempt);
         }
-        p.motion.integrate_positions(f, &step, MAX_SPEED);
+        p.motion
+            .integrate_positions(f, &step, self.model.config.max_speed);
     }
 
     /// Selects the planes that vertices can reach until the next selection.

@@ -21,7 +21,7 @@ pub(crate) struct Cli {
 pub(crate) enum Command {
     /// Tracking over iterations, samples, correspondences and metric, on recorded and synthetic sequences.
     Tracking(TrackingArgs),
-    /// Cloth solvers on the standard scenes: small steps, XPBD, quasi-Newton, the paper's mass-spring step.
+    /// Cloth on the standard scenes, by the live step or the offline solver.
     Cloth(ClothArgs),
     /// Tracking of everyone who walks in: people, postures and sides from nothing, stills and recordings.
     People(PeopleArgs),
@@ -97,8 +97,8 @@ pub(crate) struct ClothArgs {
     /// Only these scenes, by file name without extension.
     #[arg(long, value_name = "NAME")]
     pub(crate) scene: Vec<String>,
-    /// Slow methods on the large scenes too (many minutes).
-    #[arg(long)]
+    /// Slow variants on the large scenes too (many minutes, with --offline).
+    #[arg(long, requires = "offline")]
     pub(crate) full: bool,
     /// The offline solver instead: time schemes, linear solvers, steps, resolutions (cloth-offline.csv …).
     #[arg(long)]

@@ -58,10 +58,7 @@ pub(crate) fn cloth(args: &ClothArgs) -> Result<ExitCode> {
     if args.offline {
         return with_threads(args.threads, || cloth_offline(args))?;
     }
-    let mut bench = ClothBench {
-        full: args.full,
-        ..ClothBench::default()
-    };
+    let mut bench = ClothBench::default();
     if !args.scene.is_empty() {
         bench.scenes.clone_from(&args.scene);
     }

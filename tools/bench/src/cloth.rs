@@ -1,19 +1,19 @@
-//! Cloth solvers side by side on the standard scenes, against reference positions where there are some.
+//! The live step on the standard scenes, against reference positions where there are some.
 
 use super::{EvaluateError, Row, Table};
 use std::ops::ControlFlow;
 use std::path::Path;
-use tryon_cloth::scene::{Method, RunConfig, RunReport, Scene, SceneError, load, run};
+use tryon_cloth::Config;
+use tryon_cloth::scene::{RunReport, Scene, SceneError, load, run};
 use tryon_formats::npy::read_npy;
 use tryon_geometry::math::P3;
+use tryon_geometry::par::Par;
 
-/// Scenes and extent of the comparison of solvers.
+/// Scenes measured.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ClothBench {
     /// Scene names: files of the scenes folder without extension.
     pub scenes: Vec<String>,
-    /// All methods on the large scenes too (minutes).
-    pub full: bool,
 }
 
 impl Default for ClothBench {
@@ -28,49 +28,76 @@ impl Default for ClothBench {
         ];
         Self {
             scenes: scenes.map(str::to_owned).to_vec(),
-            full: false,
         }
     }
 }
 
-/// A method and its settings: steps a frame (0: as many as the fabric needs), iterations, patches.
-const SETTINGS: [(Method, usize, usize, usize); 17] = [
-    (Method::Explicit, 0, 1, 1),
-    (Method::Explicit, 0, 1, 2),
-    (Method::Explicit, 50, 1, 1),
-    (Method::Explicit, 80, 1, 1),
-    (Method::Explicit, 128, 1, 2),
-    (Method::Explicit, 160, 1, 1),
-    (Method::Xpbd, 20, 1, 1),
-    (Method::Xpbd, 40, 1, 1),
-    (Method::Xpbd, 80, 1, 1),
-    (Method::QuasiNewton, 2, 10, 1),
-    (Method::QuasiNewton, 8, 10, 1),
-    (Method::QuasiNewtonBdf2, 2, 10, 1),
-    (Method::QuasiNewtonBdf2, 4, 10, 1),
-    (Method::QuasiNewtonBdf2, 8, 10, 1),
-    (Method::MassSpring, 2, 1, 1),
-    (Method::MassSpring, 4, 1, 1),
-    (Method::MassSpring, 8, 1, 1),
-];
-/// Scenes with more vertices than this are left to the fast methods unless asked for.
-const LARGE: usize = 2000;
+/// Settings of the live step on a scene.
+#[derive(Clone, Copy)]
+struct Variant {
+    name: &'static str,
+    /// Patches, each on a thread of its own.
+    patches: usize,
+    self_collision: bool,
+    /// Most substeps in 1/60 s; `None`: as many as the fabric needs.
+    most_steps: Option<usize>,
+}
 
-/// Name of a method in tables.
-pub fn method_name(m: Method) -> &'static str {
-    match m {
-        Method::Explicit => "small steps",
-        Method::QuasiNewton => "quasi-Newton, implicit Euler",
-        Method::QuasiNewtonBdf2 => "quasi-Newton, BDF2",
-        Method::Xpbd => "XPBD",
-        Method::MassSpring => "mass-spring (paper)",
+/// Variants measured, the settings of scenes first.
+const VARIANTS: [Variant; 5] = {
+    let whole = Variant {
+        name: "live step",
+        patches: 1,
+        self_collision: true,
+        most_steps: None,
+    };
+    [
+        whole,
+        Variant {
+            name: "live step, two threads",
+            patches: 2,
+            ..whole
+        },
+        Variant {
+            name: "without self-contact",
+            self_collision: false,
+            ..whole
+        },
+        Variant {
+            name: "substeps of worn garments",
+            most_steps: Some(72),
+            ..whole
+        },
+        Variant {
+            name: "the same on two threads",
+            patches: 2,
+            most_steps: Some(72),
+            ..whole
+        },
+    ]
+};
+
+impl Variant {
+    fn config(&self, scene: &Scene) -> Config {
+        let config = scene.config();
+        Config {
+            patch: scene.start.len().div_ceil(self.patches),
+            par: if self.patches > 1 {
+                Par::Rayon
+            } else {
+                Par::Seq
+            },
+            self_collision: self.self_collision,
+            most_steps: self.most_steps.unwrap_or(config.most_steps),
+            ..config
+        }
     }
 }
 
-/// Runs every method on every scene of `folder`; `progress` receives each row.
+/// Runs every variant on every scene of `folder`; `progress` receives each row.
 ///
 /// # Errors
-/// A scene that cannot be read. A method that diverges is a row with error `diverged` 1.
+/// A scene that cannot be read. A variant that diverges is a row with error `diverged` 1.
 pub fn cloth(
     folder: &Path,
     bench: &ClothBench,
@@ -89,28 +116,19 @@ pub fn cloth(
         };
         let scene = load(&folder.join(format!("{name}.json"))).map_err(fault)?;
         let reference = reference(folder, name, &scene);
-        for (method, substeps, iterations, patches) in SETTINGS {
-            if scene.start.len() > LARGE && method != Method::Explicit && !bench.full {
-                continue;
-            }
-            let config = RunConfig {
-                method,
-                substeps,
-                iterations,
-                patches,
-                ..RunConfig::default()
-            };
+        for variant in &VARIANTS {
             let mut frames = Vec::new();
-            let result = run(&scene, &config, |_, p| {
+            let result = run(&scene, &variant.config(&scene), |_, p| {
                 frames.push(p.to_vec());
                 ControlFlow::Continue(())
             });
-            let row = match result {
-                Ok(report) => measured(name, &config, &report, &frames, reference.as_deref()),
-                Err(_) => Row::new(name.clone(), method_name(method), f64::NAN)
-                    .with("steps", substeps)
-                    .with("iterations", iterations)
-                    .with("patches", patches)
+            let row = match (&result, &reference) {
+                (Ok(r), Some(reference)) => {
+                    reference_errors(measured(name, variant, r), &frames, reference)
+                }
+                (Ok(r), None) => measured(name, variant, r),
+                (Err(_), _) => Row::new(name.clone(), variant.name, f64::NAN)
+                    .with("patches", variant.patches)
                     .error("diverged", 1.0),
             };
             progress(&row);
@@ -120,26 +138,13 @@ pub fn cloth(
     Ok(table)
 }
 
-fn measured(
-    name: &str,
-    config: &RunConfig,
-    r: &RunReport,
-    frames: &[Vec<P3>],
-    reference: Option<&[Vec<P3>]>,
-) -> Row {
-    let mut row = Row::new(name, method_name(config.method), r.ms_median)
+fn measured(scene: &str, variant: &Variant, r: &RunReport) -> Row {
+    Row::new(scene, variant.name, r.ms_median)
         .with("steps", r.substeps)
-        .with("iterations", r.iterations)
-        .with("patches", config.patches)
+        .with("patches", variant.patches)
+        .with("stiffness_kept", format!("{:.2}", r.softened))
         .error("strain_p99_percent", r.p99_strain * 100.0)
-        .error("penetration_mm", r.penetration * 1e3);
-    if config.method == Method::Explicit {
-        row = row.with("stiffness_kept", format!("{:.2}", r.softened));
-    }
-    match reference {
-        Some(reference) => reference_errors(row, frames, reference),
-        None => row,
-    }
+        .error("penetration_mm", r.penetration * 1e3)
 }
 
 /// Adds the distances from reference positions, shape `[frames][vertices]`: the centre of mass over all frames, the vertices at

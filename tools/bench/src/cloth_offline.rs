@@ -4,10 +4,8 @@ use super::cloth::{reference, reference_errors};
 use super::{EvaluateError, Row, Table};
 use std::ops::ControlFlow;
 use std::path::Path;
-use tryon_cloth::fine::{
-    LinearMethod, OfflineFrameReport, OfflineScene, OfflineSettings, TimeScheme,
-};
-use tryon_cloth::scene::{Scene, load};
+use tryon_cloth::fine::{LinearMethod, OfflineFrameReport, OfflineSettings, TimeScheme};
+use tryon_cloth::scene::{OfflineScene, Scene, load};
 use tryon_geometry::math::P3;
 use tryon_geometry::math::order_statistics::median;
 use tryon_geometry::par::Par;

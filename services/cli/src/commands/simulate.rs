@@ -9,8 +9,8 @@ use anyhow::Result;
 use serde::Serialize;
 use std::ops::ControlFlow;
 use std::process::ExitCode;
-use tryon::cloth::fine::{OfflineFrameReport, OfflineScene, OfflineSettings, checkpoint_frame};
-use tryon::cloth::scene::{self, RunConfig, Scene};
+use tryon::cloth::fine::{OfflineFrameReport, OfflineSettings, checkpoint_frame};
+use tryon::cloth::scene::{self, OfflineScene, Scene};
 use tryon::formats::gltf::{GlbMesh, write_glb_motion};
 use tryon::geometry::math::P3;
 use tryon::geometry::par::Par;
@@ -37,7 +37,7 @@ pub(crate) fn run(args: &SimulateArgs) -> Result<ExitCode> {
 fn realtime(args: &SimulateArgs, scene: &Scene) -> Result<ExitCode> {
     let bar = input::progress(Some(scene.frames() as u64), "simulating");
     let mut frames = Vec::with_capacity(scene.frames());
-    let report = scene::run(scene, &RunConfig::default(), |_, positions| {
+    let report = scene::run(scene, &scene.config(), |_, positions| {
         frames.push(positions.to_vec());
         bar.inc(1);
         ControlFlow::Continue(())

@@ -1,4 +1,4 @@
-//! Self-contact of one sheet, in worn garments, while dressing, and in scenes.
+//! Self-contact of one sheet, in worn garments and while dressing.
 //!
 //! A vertex stays on its side of the nearest triangle of another fold. Both folds keep their mean velocity; no constraint
 //! needs a common solution.

@@ -1,12 +1,10 @@
-//! A sheet of cloth as a mechanical system: masses, flat triangles, hinges, and the constant matrix of its stiffness.
+//! A sheet of cloth as a mechanical system: masses, flat triangles, hinges.
 
 use super::bending::{Hinge, Wing};
 use super::membrane::Membrane;
 use crate::live::ClothError;
 use nalgebra::Matrix3x2;
-use std::sync::Arc;
 use tryon_garment::Material;
-use tryon_geometry::linear::SymmetricPattern;
 use tryon_geometry::math::order_statistics::percentile;
 use tryon_geometry::math::{P3, V3d};
 use tryon_geometry::mesh::{Face, Topology, TriMesh};
@@ -65,10 +63,6 @@ pub struct Sheet {
     pub membrane: Membrane,
     /// Edges with their rest lengths (m).
     pub edges: Vec<([u32; 2], f64)>,
-    /// Pattern of the system matrix.
-    pub pattern: Arc<SymmetricPattern>,
-    /// Constant part of the system matrix, stiffness without inertia, in pattern order (N/m).
-    pub stiffness: Vec<f64>,
     /// Rate of air drag (1/s).
     pub damping: f64,
     /// Coulomb coefficient.
@@ -112,17 +106,11 @@ impl Sheet {
             })
             .collect();
         let hinges = hinges(&topology, &flat, &elements, material.bending, curved_rest);
-        let pairs = edges.iter().map(|(v, _)| (v[0], v[1]));
-        let across = hinges.iter().map(|h| (h.v[2], h.v[3]));
-        let pattern = SymmetricPattern::new(vertices, pairs.chain(across))?;
-        let membrane = Membrane::new(material);
         Ok(Self {
-            stiffness: constant_stiffness(&pattern, &elements, &hinges, &membrane),
-            pattern: Arc::new(pattern),
             mass,
             elements,
             hinges,
-            membrane,
+            membrane: Membrane::new(material),
             edges,
             damping: material.damping,
             friction: material.friction,
@@ -241,38 +229,6 @@ fn hinges(
         hinges.push(hinge);
     }
     hinges
-}
-
-/// Stiffness near rest in pattern order (N/m).
-fn constant_stiffness(
-    pattern: &SymmetricPattern,
-    elements: &[Element],
-    hinges: &[Hinge],
-    membrane: &Membrane,
-) -> Vec<f64> {
-    let mut stiffness = vec![0.0; pattern.entries()];
-    let mut add = |i: u32, j: u32, w: f64| {
-        if let Some(s) = pattern.slot(i, j) {
-            stiffness[s] += w;
-        }
-    };
-    let k = membrane.stiffest();
-    for e in elements {
-        for i in 0..3 {
-            for j in 0..=i {
-                let along = k[0] * e.b[i][0] * e.b[j][0] + k[1] * e.b[i][1] * e.b[j][1];
-                add(e.v[i], e.v[j], e.area * along);
-            }
-        }
-    }
-    for h in hinges {
-        for i in 0..4 {
-            for j in 0..=i {
-                add(h.v[i], h.v[j], h.w * h.c[i] * h.c[j]);
-            }
-        }
-    }
-    stiffness
 }
 
 #[cfg(test)]

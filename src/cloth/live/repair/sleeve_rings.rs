@@ -36,7 +36,7 @@ const EDGE_PERCENTILE: usize = 95;
 const ARMS: [Region; 2] = [Region::LEFT_ARM, Region::RIGHT_ARM];
 
 /// Rings of skin along both arms, from the shoulder to the finger tips.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub struct Arms([Vec<Vec<u32>>; 2]);
 
 impl Arms {

@@ -2,8 +2,6 @@
 //! over the square of the step [1/kg].
 
 use crate::live::Hinge;
-use crate::live::solver::explicit::V4;
-use nalgebra::{Matrix3, Vector3};
 use tryon_geometry::math::V3d;
 
 /// Brings an edge that is longer than `least` towards a length (m); `w`: inverse masses of its ends.
@@ -37,52 +35,6 @@ pub fn project_hinge(x: &mut [V3d], hinge: &Hinge, w: [f64; 4], compliance: f64)
     let push = q / (sum + compliance);
     for k in 0..4 {
         x[hinge.v[k] as usize] -= push * (w[k] * hinge.c[k]);
-    }
-}
-
-/// Three edges of a triangle that are projected together. Edge k lies opposite corner k.
-#[derive(Clone, Copy, Debug)]
-pub struct TriangleConstraint {
-    /// Corners.
-    pub v: [u32; 3],
-    /// Lengths at rest (m).
-    pub rest: [f32; 3],
-    /// Compliance between the edges: the inverse of their stiffness, over the square of the step.
-    pub compliance: Matrix3<f32>,
-}
-
-impl TriangleConstraint {
-    /// Moves the corners; `weight`: inverse masses.
-    #[inline]
-    pub fn project(&self, weight: &[f32], x: &mut [V4]) {
-        let v = self.v.map(|v| v as usize);
-        let w = v.map(|v| weight[v]);
-        let mut along = [V4::default(); 3];
-        let mut c = Vector3::zeros();
-        for k in 0..3 {
-            let d = x[v[(k + 2) % 3]] - x[v[(k + 1) % 3]];
-            let l = d.dot(d).sqrt().max(f32::MIN_POSITIVE);
-            along[k] = d.scale(1.0 / l);
-            c[k] = l - self.rest[k];
-        }
-        let mut a = self.compliance;
-        for k in 0..3 {
-            a[(k, k)] += w[(k + 1) % 3] + w[(k + 2) % 3];
-            // Edges k and j = k + 1 meet in corner k + 2, the first one's end and the second one's start.
-            let j = (k + 1) % 3;
-            let shared = -w[(k + 2) % 3] * along[k].dot(along[j]);
-            a[(k, j)] += shared;
-            a[(j, k)] += shared;
-        }
-        let Some(inverse) = a.try_inverse() else {
-            return;
-        };
-        let l = -(inverse * c);
-        for k in 0..3 {
-            let (p, q) = ((k + 1) % 3, (k + 2) % 3);
-            x[v[p]] = x[v[p]] - along[k].scale(l[k] * w[p]);
-            x[v[q]] = x[v[q]] + along[k].scale(l[k] * w[q]);
-        }
     }
 }
 
@@ -133,26 +85,5 @@ mod tests {
         let before = x;
         project_hinge(&mut x, &hinge, [0.0; 4], 0.0);
         assert_eq!(x, before);
-    }
-
-    #[test]
-    fn stiff_triangle_without_stretch_modes_keeps_its_rest_shape() {
-        let constraint = TriangleConstraint {
-            v: [0, 1, 2],
-            rest: [1.0; 3],
-            compliance: Matrix3::zeros(),
-        };
-        let mut x = [
-            V4::new(0.0, 0.0, 0.0),
-            V4::new(1.1, 0.0, 0.0),
-            V4::new(0.5, 0.9, 0.1),
-        ];
-        for _ in 0..20 {
-            constraint.project(&[1.0; 3], &mut x);
-        }
-        for k in 0..3 {
-            let d = x[(k + 1) % 3] - x[(k + 2) % 3];
-            assert!((d.dot(d).sqrt() - 1.0).abs() < 1e-5);
-        }
     }
 }

@@ -5,13 +5,11 @@ use nalgebra::{Matrix2, Matrix3, Vector2};
 
 /// Springs of a triangle. Edge k lies opposite corner k.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct TriangleSprings {
+pub(super) struct TriangleSprings {
     /// Corners.
-    pub(crate) v: [u32; 3],
+    pub(super) v: [u32; 3],
     /// Stiffness between the lengthenings of the edges (N/m).
-    pub(crate) stiffness: Matrix3<f64>,
-    /// Lengths at rest (m).
-    pub(crate) rest: [f64; 3],
+    pub(super) stiffness: Matrix3<f64>,
     /// Unit directions at rest, from corner k + 1 to corner k + 2.
     pub(super) directions: [Vector2<f64>; 3],
 }
@@ -34,14 +32,7 @@ impl TriangleSprings {
         Some(Self {
             v: e.v,
             stiffness: inverse.transpose() * sheet.membrane.hooke() * inverse * e.area,
-            rest,
             directions,
         })
     }
-}
-
-/// Springs of every triangle with an area.
-pub(crate) fn triangle_springs(sheet: &Sheet) -> Vec<TriangleSprings> {
-    let of = |e| TriangleSprings::new(sheet, e);
-    sheet.elements.iter().filter_map(of).collect()
 }

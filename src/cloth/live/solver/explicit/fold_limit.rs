@@ -146,7 +146,6 @@ mod tests {
             let spec = StepSpec {
                 h: f64::from(H),
                 lookahead: 0.25,
-                springs_only: false,
                 bending_interval: 3,
                 filter_degree: 0,
             };

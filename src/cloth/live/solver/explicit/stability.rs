@@ -20,7 +20,7 @@ const OUTLIERS: f64 = 0.05;
 
 /// Largest eigenvalue of each element over the mass at its corners [1/s²]. No eigenvalue of the sheet is above the
 /// largest of these (Irons and Treharne 1971).
-pub(super) fn element_limits(sheet: &Sheet, springs_only: bool) -> Vec<f64> {
+pub(super) fn element_limits(sheet: &Sheet) -> Vec<f64> {
     let mut area = vec![0.0; sheet.mass.len()];
     for e in &sheet.elements {
         for v in e.v {
@@ -32,13 +32,13 @@ pub(super) fn element_limits(sheet: &Sheet, springs_only: bool) -> Vec<f64> {
         // Each corner lends the element its mass in proportion to the element's area around it.
         let mass =
             e.v.map(|v| sheet.mass[v as usize] * e.area / area[v as usize]);
-        Some(element_limit(&springs, mass, springs_only))
+        Some(element_limit(&springs, mass))
     };
     let all = sheet.elements.iter();
     all.map(|e| limit(e).unwrap_or(0.0)).collect()
 }
 
-fn element_limit(springs: &TriangleSprings, mass: [f64; 3], springs_only: bool) -> f64 {
+fn element_limit(springs: &TriangleSprings, mass: [f64; 3]) -> f64 {
     let u: [Vector6<f64>; 3] = std::array::from_fn(|i| {
         let (a, b) = ((i + 1) % 3, (i + 2) % 3);
         let mut u = Vector6::zeros();
@@ -51,9 +51,7 @@ fn element_limit(springs: &TriangleSprings, mass: [f64; 3], springs_only: bool) 
     let mut m = Matrix6::zeros();
     for i in 0..3 {
         for j in 0..3 {
-            if i == j || !springs_only {
-                m += u[i] * u[j].transpose() * springs.stiffness[(i, j)];
-            }
+            m += u[i] * u[j].transpose() * springs.stiffness[(i, j)];
         }
     }
     let scale = Vector6::from_fn(|i, _| 1.0 / mass[i / 2].sqrt());
@@ -173,7 +171,7 @@ impl FlatSheet {
         Self(all)
     }
     /// Largest eigenvalue of the filtered membrane [1/s²], where each element has a share `keep` of its stiffness.
-    pub(super) fn eigenvalue(&self, keep: &[f64], springs_only: bool, filter: &MassFilter) -> f64 {
+    pub(super) fn eigenvalue(&self, keep: &[f64], filter: &MassFilter) -> f64 {
         largest_eigenvalue(filter, |x, y| {
             for (springs, keep) in self.0.iter().zip(keep) {
                 let Some(s) = springs else { continue };
@@ -181,11 +179,7 @@ impl FlatSheet {
                 let d = Vector3::from_fn(|i, _| {
                     s.directions[i].dot(&(p[(i + 2) % 3] - p[(i + 1) % 3]))
                 });
-                let t = if springs_only {
-                    s.stiffness.diagonal().component_mul(&d)
-                } else {
-                    s.stiffness * d
-                } * *keep;
+                let t = s.stiffness * d * *keep;
                 let pull: [Vector2<f64>; 3] = std::array::from_fn(|i| s.directions[i] * t[i]);
                 // Edge i runs from corner i + 1 to corner i + 2.
                 for i in 0..3 {

@@ -16,8 +16,6 @@ pub struct StepSpec {
     pub h: f64,
     /// Extrapolation of the positions that forces are evaluated at (substeps). Damps the fastest modes.
     pub lookahead: f64,
-    /// Uncoupled edges: the paper's mass-spring model.
-    pub springs_only: bool,
     /// Substeps between two evaluations of bending.
     pub bending_interval: usize,
     /// Degree of the mass filter, 0 for none. Each degree allows longer steps and slows the finest waves.
@@ -55,8 +53,6 @@ const SOFT: f64 = 0.99;
 const FLAT: f64 = 1e-4;
 /// Fewest and most substeps between two evaluations of bending. Fewer cost more than narrow hinges need; more gain little.
 const BENDING_INTERVAL: [usize; 2] = [3, 6];
-/// Highest filter degree: a third one gains another quarter of the step and costs as much.
-const MAX_FILTER_DEGREE: usize = 2;
 
 impl StableSheet {
     /// Compiles a sheet for a step.
@@ -65,11 +61,9 @@ impl StableSheet {
         // Symplectic Euler is stable to 4/h²; extrapolation lowers that.
         let limit = 4.0 / (spec.h * spec.h * (1.0 + 2.0 * spec.lookahead) * MARGIN);
         let filter = MassFilter::of_sheet(sheet, edges.ends(), spec.filter_degree);
-        let limits = element_limits(sheet, spec.springs_only);
+        let limits = element_limits(sheet);
         let flat = FlatSheet::new(sheet);
-        let keep = soften(limit, &limits, |k| {
-            flat.eigenvalue(k, spec.springs_only, &filter)
-        });
+        let keep = soften(limit, &limits, |k| flat.eigenvalue(k, &filter));
         let area: f64 = sheet.elements.iter().map(|e| e.area).sum();
         let kept: f64 = sheet
             .elements
@@ -86,7 +80,7 @@ impl StableSheet {
             kept_stiffness: kept / area.max(f64::MIN_POSITIVE),
             soft_elements: keep.iter().filter(|k| **k < SOFT).count(),
             inverse_mass: sheet.mass.iter().map(|m| (1.0 / m) as f32).collect(),
-            triangles: triangles(sheet, &keep, spec.springs_only, &edges),
+            triangles: triangles(sheet, &keep, &edges),
             rest: edges.0.iter().map(|e| e.1 as f32).collect(),
             ends: edges.ends(),
             bend,
@@ -100,15 +94,6 @@ impl StableSheet {
     /// Number of vertices.
     pub fn vertices(&self) -> usize {
         self.inverse_mass.len()
-    }
-    /// The lowest filter degree with a stable step of at least `enough` seconds, or the highest, and that step (s).
-    pub fn choose_filter(sheet: &Sheet, lookahead: f64, enough: f64) -> (usize, f64) {
-        let step = Self::stable_steps(sheet, lookahead);
-        let mut found = (0, step(0));
-        while found.1 < enough && found.0 < MAX_FILTER_DEGREE {
-            found = (found.0 + 1, step(found.0 + 1));
-        }
-        found
     }
     /// Substeps of `h` seconds that bending forces may be kept for, within `BENDING_INTERVAL`: all but a few small
     /// hinges keep all their stiffness.
@@ -126,11 +111,11 @@ impl StableSheet {
     }
     /// [`Self::stable_step`] as a function of the filter degree.
     pub fn stable_steps(sheet: &Sheet, lookahead: f64) -> impl Fn(usize) -> f64 {
-        let keep = without_outliers(&element_limits(sheet, false));
+        let keep = without_outliers(&element_limits(sheet));
         let flat = FlatSheet::new(sheet);
         move |degree| {
             let filter = MassFilter::of_sheet(sheet, ends(sheet), degree);
-            let fastest = flat.eigenvalue(&keep, false, &filter);
+            let fastest = flat.eigenvalue(&keep, &filter);
             (4.0 / (fastest.max(f64::MIN_POSITIVE) * MARGIN * (1.0 + 2.0 * lookahead))).sqrt()
         }
     }
@@ -162,17 +147,11 @@ impl SortedEdges {
 }
 
 /// Triangles with a share `keep` of their stiffness.
-fn triangles(
-    sheet: &Sheet,
-    keep: &[f64],
-    springs_only: bool,
-    edges: &SortedEdges,
-) -> Vec<EdgeTriangle> {
+fn triangles(sheet: &Sheet, keep: &[f64], edges: &SortedEdges) -> Vec<EdgeTriangle> {
     let triangle = |(e, keep): (&Element, &f64)| {
         let k = TriangleSprings::new(sheet, e)?.stiffness;
-        let coupling = if springs_only { 0.0 } else { *keep };
         let own = [0, 1, 2].map(|i| (k[(i, i)] * keep) as f32);
-        let k = [(1, 2), (2, 0), (0, 1)].map(|i| (k[i] * coupling) as f32);
+        let k = [(1, 2), (2, 0), (0, 1)].map(|i| (k[i] * keep) as f32);
         Some(EdgeTriangle {
             v: e.v,
             rest: [0, 1, 2].map(|i| edges.length(e.v[(i + 1) % 3], e.v[(i + 2) % 3]) as f32),

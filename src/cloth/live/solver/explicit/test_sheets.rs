@@ -92,7 +92,6 @@ impl Lab {
         let spec = StepSpec {
             h,
             lookahead: 0.25,
-            springs_only: false,
             bending_interval,
             filter_degree,
         };

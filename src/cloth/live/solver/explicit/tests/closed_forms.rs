@@ -1,7 +1,7 @@
 //! Closed forms: elongation, catenary, cantilever, friction, curved rest shapes.
 
 use crate::live::Sheet;
-use crate::live::solver::explicit::edge_stiffness::triangle_springs;
+use crate::live::solver::explicit::edge_stiffness::TriangleSprings;
 use crate::live::solver::explicit::test_sheets::{Lab, cotton, distance, grid, sheet};
 use crate::live::solver::explicit::{ContactPlane, V4};
 use tryon_geometry::math::{P3, V3d};
@@ -13,7 +13,13 @@ fn edge_springs_have_the_energy_of_hookes_law() {
     let mut m = cotton(0.0);
     m.stretch_warp *= 2.0;
     let s = sheet(&[[0, 1, 2]], &rest, 3, &m);
-    let springs = triangle_springs(&s)[0];
+    let springs = TriangleSprings::new(&s, &s.elements[0]).expect("an area");
+    let lengths = |p: [[f64; 2]; 3]| {
+        nalgebra::Vector3::from_fn(|i, _| {
+            let (a, b) = (p[(i + 1) % 3], p[(i + 2) % 3]);
+            (a[0] - b[0]).hypot(a[1] - b[1])
+        })
+    };
     for (xx, yy, xy) in [
         (1e-4, 0.0, 0.0),
         (0.0, 1e-4, 0.0),
@@ -21,10 +27,7 @@ fn edge_springs_have_the_energy_of_hookes_law() {
         (2e-4, -1e-4, 5e-5),
     ] {
         let p = rest[0].map(|p| [p[0] * (1.0 + xx) + p[1] * xy, p[1] * (1.0 + yy) + p[0] * xy]);
-        let d = nalgebra::Vector3::from_fn(|i, _| {
-            let (a, b) = (p[(i + 1) % 3], p[(i + 2) % 3]);
-            (a[0] - b[0]).hypot(a[1] - b[1]) - springs.rest[i]
-        });
+        let d = lengths(p) - lengths(rest[0]);
         let edges = 0.5 * d.dot(&(springs.stiffness * d));
         let x: Vec<V3d> = p.iter().map(|p| V3d::new(p[0], p[1], 0.0)).collect();
         let exact = s.energy(&x);

@@ -45,7 +45,6 @@ fn cloth_beside_sleeping_cloth_moves_as_beside_held_cloth() {
         let spec = StepSpec {
             h,
             lookahead: 0.25,
-            springs_only: false,
             bending_interval: 3,
             filter_degree,
         };

@@ -1,7 +1,7 @@
 //! A scene in memory.
 
-use crate::live::integrators::collider::Collider;
-use crate::live::{ClothError, Sheet};
+use super::Collider;
+use crate::live::{ClothError, Config, Sheet};
 use tryon_formats::FormatError;
 use tryon_garment::Material;
 use tryon_geometry::math::{P3, V3d};
@@ -26,6 +26,14 @@ pub enum SceneError {
     /// The sheet or its simulation is at fault.
     #[error(transparent)]
     Cloth(#[from] ClothError),
+    /// A step of the live solver that gave no result.
+    #[error("frame {frame}: {why}")]
+    Unsolved {
+        /// Frame of the output.
+        frame: usize,
+        /// The fault.
+        why: String,
+    },
 }
 
 /// A scene, checked.
@@ -57,5 +65,28 @@ impl Scene {
     /// Number of frames of the output, the start included.
     pub fn frames(&self) -> usize {
         (self.duration * self.rate).round() as usize + 1
+    }
+
+    /// Friction of cloth on solids: that of the first solid, else of the material.
+    pub(super) fn friction(&self) -> f64 {
+        let solid = self.colliders.first();
+        solid.map_or(self.material.friction, |c| c.friction)
+    }
+
+    /// Settings of the live solver: as many substeps as the fabric needs, cloth that never sleeps, hard and exact solids.
+    pub fn config(&self) -> Config {
+        /// Distance that cloth keeps from solids (m): hides neither rounding nor a fabric's thickness.
+        const OFFSET: f64 = 5e-4;
+        /// Bound of the substeps in 1/60 s: beyond it a fabric is stiffer than any cloth.
+        const MOST_STEPS: usize = 10_000;
+        Config {
+            gravity: self.gravity.into(),
+            offset: OFFSET,
+            most_steps: MOST_STEPS,
+            sleep: false,
+            max_speed: f32::INFINITY,
+            teleport: f64::INFINITY,
+            ..Config::default()
+        }
     }
 }

@@ -1,6 +1,6 @@
 //! Colliders of a scene file.
 
-use crate::live::integrators::collider::{Collider, Primitive};
+use super::{Collider, Primitive};
 use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion};
 use serde::Deserialize;
 use std::path::Path;

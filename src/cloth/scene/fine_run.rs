@@ -1,16 +1,16 @@
-//! Scene files by the offline solver: scene in, positions of every frame out.
+//! Scenes by the offline solver: scene in, positions of every frame out.
 
-use super::garment_cloth::fabric_of;
-use super::{
-    AnimationProgress, ElasticTerm, FrameTargets, MotionState, OfflineCloth, OfflineError,
-    OfflineSettings, OfflineSolver, OfflineState, PinTarget, solid_mesh::solid_mesh,
-};
+use super::Scene;
+use super::solids::Solids;
 use crate::elastic::{BendingModel, ClothModel, RestSheet};
-use crate::live::scene::Scene;
+use crate::fine::garment_cloth::fabric_of;
+use crate::fine::{
+    AnimationProgress, ElasticTerm, FrameTargets, MotionState, OfflineCloth, OfflineError,
+    OfflineSettings, OfflineSolver, OfflineState, PinTarget,
+};
 use nalgebra::{Point3, Vector2};
 use std::ops::ControlFlow;
 use tryon_geometry::math::V3d;
-use tryon_geometry::mesh::Face;
 use tryon_geometry::par::Par;
 
 /// Scene as the offline solver needs it.
@@ -18,9 +18,7 @@ use tryon_geometry::par::Par;
 pub struct OfflineScene<'a> {
     scene: &'a Scene,
     cloth: OfflineCloth,
-    /// Surface of all solids, each in its own frame (m), with the number of its collider.
-    solids: Vec<(V3d, usize)>,
-    faces: Vec<Face>,
+    solids: Solids<'a>,
 }
 
 /// A triangle laid flat, its first edge along u.
@@ -51,28 +49,11 @@ impl<'a> OfflineScene<'a> {
         let model = ClothModel::new(&rest, x.len(), fabric, BendingModel::default())?;
         let mass = model.masses().to_vec();
         let terms = vec![Box::new(ElasticTerm::new(model)) as Box<_>];
-        let (mut solids, mut faces) = (Vec::new(), Vec::new());
-        for (number, collider) in scene.colliders.iter().enumerate() {
-            let (x, own) = solid_mesh(&collider.shape);
-            let first = solids.len() as u32;
-            faces.extend(own.iter().map(|f| f.map(|v| v + first)));
-            solids.extend(x.into_iter().map(|p| (p, number)));
-        }
         Ok(Self {
             cloth: OfflineCloth::new(mass, scene.faces.clone(), scene.gravity, terms)?,
+            solids: Solids::new(scene),
             scene,
-            solids,
-            faces,
         })
-    }
-
-    /// Surface of the solids at a time (m).
-    fn obstacle(&self, time: f64) -> Vec<V3d> {
-        let placements: Vec<_> = (self.scene.colliders.iter())
-            .map(|c| c.placement(time))
-            .collect();
-        let place = |(p, n): &(V3d, usize)| (placements[*n] * Point3::from(*p)).coords;
-        self.solids.iter().map(place).collect()
     }
 
     fn pins(&self, time: f64) -> Vec<PinTarget> {
@@ -102,10 +83,9 @@ impl<'a> OfflineScene<'a> {
     ) -> Result<usize, OfflineError> {
         let mut settings = *settings;
         if let Some(contact) = &mut settings.contact {
-            let solid = self.scene.colliders.first();
-            contact.friction = solid.map_or(self.scene.material.friction, |c| c.friction);
+            contact.friction = self.scene.friction();
         }
-        let (start, interval) = (self.obstacle(0.0), 1.0 / self.scene.rate);
+        let (start, interval) = (self.solids.at(0.0), 1.0 / self.scene.rate);
         let state = OfflineState {
             now: MotionState {
                 x: self.scene.start.iter().map(|p| p.coords.cast()).collect(),
@@ -114,7 +94,7 @@ impl<'a> OfflineScene<'a> {
             obstacle: [start.clone(), start],
             ..OfflineState::default()
         };
-        let mut solver = OfflineSolver::new(&self.cloth, &self.faces, state, settings, par)?;
+        let mut solver = OfflineSolver::new(&self.cloth, &self.solids.faces, state, settings, par)?;
         let frames = self.scene.frames().saturating_sub(1);
         let first = match checkpoint {
             Some(bytes) => solver.resume(bytes)? as usize,
@@ -122,7 +102,7 @@ impl<'a> OfflineScene<'a> {
         };
         let script: Vec<_> = (0..=frames)
             .map(|k| interval * k as f64)
-            .map(|t| (self.pins(t), self.obstacle(t)))
+            .map(|t| (self.pins(t), self.solids.at(t)))
             .collect();
         solver.animate(
             interval,
