@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Alpha expansion of gco-wrapper and PyMaxflow beside this project's solver, on the same integer energies.
 
-    cargo run --release --example potts_labelling -- out/potts
+    cargo run --release -p tryon-bench --example potts_labelling -- out/potts
     python3 benches/peers/alpha_expansion.py out/potts [--example target/release/examples/potts_labelling]
 
 With --example the project's solver runs in the same call, before the peers. All start from the labels of least

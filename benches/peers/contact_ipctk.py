@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Distances, barrier and friction of IPC Toolkit beside this project's, on the same contact pairs.
 
-    cargo run --release --example contact_potentials -- out/contact
+    cargo run --release -p tryon-bench --example contact_potentials -- out/contact
     python3 benches/peers/contact_ipctk.py out/contact [--example target/release/examples/contact_potentials]
 
 With --example the project's potentials run in the same call, before the peer. Prints the largest relative difference of

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Non-rigid registration and sparse solvers of others beside this project's free surface, on the same scan and system.
 
-    cargo run --release --example free_surface -- out/surface
+    cargo run --release -p tryon-bench --example free_surface -- out/surface
     python3 benches/peers/free_surface.py out/surface [--example target/release/examples/free_surface] [--only solve]
 
 With --example the project runs in the same call, before the peers. Registration: all start at the body model fitted to

@@ -1,6 +1,6 @@
 //! The compositor on the graphics card against the processor: the same pictures, timed side by side.
 //!
-//! `cargo run --release --features gpu --example card -- [--software] [--rounds N] [--out DIR]`
+//! `cargo run --release -p tryon-bench --features gpu --example card -- [--software] [--rounds N] [--out DIR]`
 //!
 //! A synthetic user in T-shirt and skirt at three sizes. Prints a Markdown row a size: medians and 99th percentiles in
 //! milliseconds, and the number of pixels that differ.

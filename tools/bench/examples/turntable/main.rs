@@ -1,6 +1,6 @@
 //! Dresses bodies and draws each outfit from several sides into one PNG.
 //!
-//! `cargo run --release --example turntable -- --garment tshirt --garment longsleeve+trousers --out DIR
+//! `cargo run --release -p tryon-bench --example turntable -- --garment tshirt --garment longsleeve+trousers --out DIR
 //!   [--garment FILE.obj|.glb|.mhclo|.json [--garment-body FILE.npz|.obj]] [--body average,slim_woman,heavy_man | FILE.npz | RECORDING] [--size auto,S,M,XL] [--pose down|tpose|rest|walk|raise]
 //!   [--seconds 1.0] [--views 0,45,90,180] [--cell 220x340] [--crop] [--edge 0.021] [--fit] [--any-size] [--no-folds]
 //!   [--sharpest 0.6] [--crossings] [--tangled] [--measured]`

@@ -1,6 +1,6 @@
 //! Sleeping cloth on a body that stands, waves or walks off: share asleep, time of a step, distance from the truth.
 //!
-//! `cargo run --release --example standing -- [--garment skirt+tshirt] [--edge 0.0118] [--threads 2] [--steps 120]
+//! `cargo run --release -p tryon-bench --example standing -- [--garment skirt+tshirt] [--edge 0.0118] [--threads 2] [--steps 120]
 //!   [--rounds 2] [--arms 75]`
 //!
 //! `--arms`: degrees below the horizontal; 75 hang, without it they are off the trunk.

@@ -1,6 +1,6 @@
 //! Dresses a dancing body, measures, and draws a film strip.
 //!
-//! `cargo run --release --example dance -- [--data ../shared/data/garments/cipc_apache2] [--garment tshirt+skirt]
+//! `cargo run --release -p tryon-bench --example dance -- [--data ../shared/data/garments/cipc_apache2] [--garment tshirt+skirt]
 //!   [--edge 0.0118] [--seconds 4.8] [--threads 2] [--most-steps 72] [--patch 6000] [--sharpest 0.6] [--no-layers] [--no-folds]
 //!   [--deepest 12] [--out strip.png] [--from 0] [--every 0.4]`
 #![allow(clippy::print_stdout, clippy::unwrap_used, clippy::expect_used)] // a development tool: stop at the first fault

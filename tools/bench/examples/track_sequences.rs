@@ -1,6 +1,6 @@
 //! Tracks recorded and synthetic scenes and prints the measures of `tryon-bench tracking` for chosen settings.
 //!
-//! `cargo run --release --example track_sequences -- [--body FILE]… [--set JSON]… [--own] [--synth] [--hard] [--upper]
+//! `cargo run --release -p tryon-bench --example track_sequences -- [--body FILE]… [--set JSON]… [--own] [--synth] [--hard] [--upper]
 //! [--frames N] [--nth N] [--still N] [--stages] FOLDER…`
 //!
 //! Every body and setting runs on every scene. `--own` gives a scene its subject's own body, `--synth`, `--hard` and

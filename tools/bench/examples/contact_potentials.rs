@@ -1,7 +1,7 @@
 //! Distances, barrier and friction of random and nearly degenerate contact pairs: time per pair, and all derivatives as
 //! raw files.
 //!
-//! `cargo run --release --example contact_potentials -- out/contact`, then `benches/peers/contact_ipctk.py`.
+//! `cargo run --release -p tryon-bench --example contact_potentials -- out/contact`, then `benches/peers/contact_ipctk.py`.
 #![allow(clippy::print_stdout)]
 
 use std::hint::black_box;

@@ -1,6 +1,6 @@
 //! Alpha expansion on synthetic labellings of a tube mesh: time and energy, and the energies as raw files.
 //!
-//! `cargo run --release --example potts_labelling -- out/potts`, then `benches/peers/alpha_expansion.py`.
+//! `cargo run --release -p tryon-bench --example potts_labelling -- out/potts`, then `benches/peers/alpha_expansion.py`.
 #![allow(clippy::print_stdout)]
 
 use std::f64::consts::TAU;

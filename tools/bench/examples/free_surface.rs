@@ -1,6 +1,6 @@
 //! Free surface of a synthetic scan and one sparse system of it: times, and both as raw files for other solvers.
 //!
-//! `cargo run --release --example free_surface -- out/surface`, then `benches/peers/free_surface.py`.
+//! `cargo run --release -p tryon-bench --example free_surface -- out/surface`, then `benches/peers/free_surface.py`.
 #![allow(clippy::print_stdout)]
 
 use std::error::Error;

@@ -1,6 +1,6 @@
 //! Cost of a picture with and without hidden faces and the normals of unseen ones.
 //!
-//! `cargo run --release --example unseen -- [--input ../shared/data/rgbd/depthkit_still] [--rounds 60] [--threads 1]
+//! `cargo run --release -p tryon-bench --example unseen -- [--input ../shared/data/rgbd/depthkit_still] [--rounds 60] [--threads 1]
 //!   [--out DIR]`
 //!
 //! The person of a recording is tracked and dressed, then the same picture is drawn with every setting in turn, round
