@@ -501,7 +501,7 @@ mod tests {
         };
         let ((off, _), (on, report)) = (crossings(false), crossings(true));
         assert!(off > 20, "{off}: nothing would be tested");
-        // On the way up to 26 come and go: the halves meet at 6 m/s, ten times what contact of live folds is made for.
+        // On the way up to 26 come and go: the halves meet at 6 m/s, and live contact lets folds close at 1 m/s.
         assert_eq!(on, 0, "{off} without");
         let energy = report.energy_end;
         assert!(energy < 0.1, "{energy} J: none is gained");
