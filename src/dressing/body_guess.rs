@@ -2,6 +2,7 @@
 
 use super::error::MeshGarmentError;
 use super::file_frame::{FileFrame, bounds};
+use super::settings::GuessSettings;
 use nalgebra::{UnitQuaternion, Vector3};
 use std::sync::Arc;
 use tryon_body::{BodyShape, BoneTransforms, Pose, RestBody, SkinSearch, Template, skin};
@@ -10,33 +11,6 @@ use tryon_geometry::par::Par;
 
 /// Limits of a garment's largest extent, metres; they decide the file's unit.
 const EXTENT: [f32; 2] = [0.22, 2.2];
-/// Horizontal distance of a garment from the file's zero from which it is moved there first, metres.
-const ASIDE: f32 = 0.4;
-/// Garment vertices in the cost; more change the guess by less than its error.
-const SAMPLES: usize = 500;
-/// Distance from the skin at which the cost saturates, metres.
-const FAR: f32 = 0.08;
-/// Mean cost over [`FAR`] from which no body wears the garment; one in mid-air has 1.
-const NOT_WORN: f32 = 0.9;
-/// Weight of vertices inside the body against those outside.
-const INSIDE: f32 = 4.0;
-/// Usual height of cloth over skin, metres.
-const ABOVE: f32 = 0.008;
-/// Standard deviation of stature over its mean.
-const STATURE_SPREAD: f64 = 0.05;
-/// Standard deviation of the floor's height in files, metres.
-const FLOOR_SPREAD: f64 = 0.03;
-/// Mean distance that one variance of stature or floor is worth, metres; larger prefers the usual body to the better fit.
-const PRIOR: f32 = 0.002;
-/// A garment that reaches below this height, metres, has the file's zero at half the stature.
-const UNDERGROUND: f32 = -0.05;
-/// Scale and arms [rad below the horizontal] at the start.
-const START: [f64; 2] = [1.0, 0.75];
-/// Limits of scale and of arms (rad).
-const LIMITS: [std::ops::Range<f64>; 2] = [0.8..1.15, -0.3..1.4];
-/// First steps of the search (see [`Guess`]), and how often they are halved.
-const STEPS: Guess = [0.04, 0.2, 0.04, 0.02];
-const HALVINGS: usize = 5;
 /// Distance within which skin is searched, metres.
 const ANYWHERE: f32 = 10.0;
 
@@ -44,8 +18,8 @@ const ANYWHERE: f32 = 10.0;
 type Guess = [f64; 4];
 
 /// Frame in which the garment's vertices lie over the skin of `template`.
-pub(super) fn locate(template: &Template, garment: &[P3]) -> FileFrame {
-    let fit = GuessFit::new(template, garment, false);
+pub(super) fn locate(template: &Template, garment: &[P3], settings: &GuessSettings) -> FileFrame {
+    let fit = GuessFit::new(template, garment, false, settings);
     fit.frame(&fit.minimise().1)
 }
 
@@ -56,10 +30,11 @@ pub(super) fn locate(template: &Template, garment: &[P3]) -> FileFrame {
 pub(super) fn guess(
     template: &Template,
     garment: &[P3],
+    settings: &GuessSettings,
 ) -> Result<(Arc<Template>, FileFrame), MeshGarmentError> {
-    let fit = GuessFit::new(template, garment, true);
+    let fit = GuessFit::new(template, garment, true, settings);
     let (cost, q) = fit.minimise();
-    if cost > NOT_WORN * FAR {
+    if cost > settings.not_worn * settings.far {
         let why = "no body fits into it: is it worn, upright, y up, and facing +z?";
         return Err(MeshGarmentError::NotFound(why.into()));
     }
@@ -70,6 +45,7 @@ pub(super) fn guess(
 
 /// A garment and the body that is fitted under it.
 struct GuessFit<'a> {
+    settings: &'a GuessSettings,
     template: &'a Template,
     rest: RestBody,
     stature: f32,
@@ -83,7 +59,12 @@ struct GuessFit<'a> {
 }
 
 impl<'a> GuessFit<'a> {
-    fn new(template: &'a Template, garment: &[P3], free: bool) -> Self {
+    fn new(
+        template: &'a Template,
+        garment: &[P3],
+        free: bool,
+        settings: &'a GuessSettings,
+    ) -> Self {
         let (lo, hi) = bounds(garment.iter());
         let scale = FileFrame::unit_of((hi - lo).amax(), EXTENT).unwrap_or(1.0);
         // The person in a file may stand anywhere in a room.
@@ -91,7 +72,7 @@ impl<'a> GuessFit<'a> {
         let aside = V3::new(middle.x, 0.0, middle.z);
         let start = FileFrame {
             scale,
-            shift: if aside.norm() > ASIDE {
+            shift: if aside.norm() > settings.aside {
                 -aside
             } else {
                 V3::zeros()
@@ -100,6 +81,7 @@ impl<'a> GuessFit<'a> {
         };
         let rest = template.personalise(&BodyShape::default());
         Self {
+            settings,
             template,
             stature: rest.vertices.iter().map(|p| p.y).fold(0.0, f32::max),
             rest,
@@ -107,7 +89,7 @@ impl<'a> GuessFit<'a> {
             start,
             points: garment
                 .iter()
-                .step_by(garment.len().div_ceil(SAMPLES).max(1))
+                .step_by(garment.len().div_ceil(settings.samples).max(1))
                 .map(|p| start.to_metres(p))
                 .collect(),
             lowest: lo.y * scale,
@@ -151,18 +133,21 @@ impl<'a> GuessFit<'a> {
     }
     /// Mean distance of the cloth from its height over the skin, plus the prior, metres.
     fn cost(&self, q: &Guess) -> f32 {
+        let &GuessSettings {
+            far, inside, above, ..
+        } = self.settings;
         let (vertices, _) = self.stand(q);
         let skin = SkinSearch::new(self.template, &vertices, 0.0);
         let shift = V3::new(0.0, q[2] as f32, q[3] as f32);
         let distance = |p: &P3| {
             let p = p + shift;
             let Some((near, d2)) = skin.nearest(&p, &V3::zeros(), ANYWHERE) else {
-                return FAR * INSIDE;
+                return far * inside;
             };
             if skin.height(&p, near) < 0.0 {
-                (INSIDE * d2.sqrt()).min(FAR * INSIDE)
+                (inside * d2.sqrt()).min(far * inside)
             } else {
-                (d2.sqrt() - ABOVE).abs().min(FAR)
+                (d2.sqrt() - above).abs().min(far)
             }
         };
         let sum: f32 = self.points.iter().map(distance).sum();
@@ -171,27 +156,45 @@ impl<'a> GuessFit<'a> {
         let floor = q[2]
             .abs()
             .min((q[2] - q[0] * f64::from(self.stature) / 2.0).abs());
-        let prior = ((q[0] - 1.0) / STATURE_SPREAD).powi(2) + (floor / FLOOR_SPREAD).powi(2);
-        sum / self.points.len().max(1) as f32 + PRIOR * prior as f32
+        let GuessSettings {
+            stature_spread,
+            floor_spread,
+            ..
+        } = self.settings;
+        let prior = ((q[0] - 1.0) / stature_spread).powi(2) + (floor / floor_spread).powi(2);
+        sum / self.points.len().max(1) as f32 + self.settings.prior * prior as f32
     }
     /// Coordinate descent with halved steps: least cost and its guess.
     fn minimise(&self) -> (f32, Guess) {
-        let at = |up: f64| -> Guess { [START[0], START[1], up, 0.0] };
+        let &GuessSettings {
+            start,
+            scales,
+            arms,
+            steps,
+            halvings,
+            ..
+        } = self.settings;
+        let at = |up: f64| -> Guess { [start[0], start[1], up, 0.0] };
         let starts = [at(f64::from(self.stature) / 2.0), at(0.0)];
-        let count = if self.lowest < UNDERGROUND { 1 } else { 2 };
+        let count = if self.lowest < self.settings.underground {
+            1
+        } else {
+            2
+        };
         let mut best = starts[..count]
             .iter()
             .map(|s| (self.cost(s), *s))
             .min_by(|a, b| a.0.total_cmp(&b.0))
             .unwrap_or_default();
-        let mut step = STEPS;
-        for _ in 0..HALVINGS {
+        let mut step = steps;
+        for _ in 0..halvings {
             for k in if self.free { 0..4 } else { 2..4 } {
                 for sign in [-1.0, 1.0] {
                     loop {
                         let mut q = best.1;
                         q[k] += sign * step[k];
-                        let inside = LIMITS[0].contains(&q[0]) && LIMITS[1].contains(&q[1]);
+                        let within = |k: usize, [low, high]: [f64; 2]| (low..high).contains(&q[k]);
+                        let inside = within(0, scales) && within(1, arms);
                         let c = if inside { self.cost(&q) } else { f32::MAX };
                         if c >= best.0 {
                             break;
@@ -213,14 +216,14 @@ mod tests {
 
     #[test]
     fn locate_finds_unit_and_shift_of_a_garment_that_is_an_offset_skin() {
-        let t = embedded::template();
+        let (t, settings) = (embedded::template(), GuessSettings::default());
         let x = t.mesh().vertices();
         let normals = t.normals(x);
         let garment: Vec<P3> = (0..x.len())
             .filter(|i| (0.9..1.3).contains(&x[*i].y) && x[*i].x.abs() < 0.2)
-            .map(|i| (x[i] + normals[i] * ABOVE + V3::new(0.0, 0.0, 0.04)) * 1e3)
+            .map(|i| (x[i] + normals[i] * settings.above + V3::new(0.0, 0.0, 0.04)) * 1e3)
             .collect();
-        let frame = locate(&t, &garment);
+        let frame = locate(&t, &garment, &settings);
         assert_eq!(frame.scale, 0.001);
         let miss = frame.shift - V3::new(0.0, 0.0, -0.04);
         assert!(miss.norm() < 0.01, "{miss}");
@@ -230,7 +233,8 @@ mod tests {
     fn a_garment_in_mid_air_has_no_body() {
         let corners = [[0.0, 4.0], [0.5, 4.0], [0.5, 4.4], [0.0, 4.4]];
         let garment = corners.map(|[x, y]| P3::new(x, y, 0.0));
-        let e = guess(&embedded::template(), &garment).expect_err("nobody is that tall");
+        let e = guess(&embedded::template(), &garment, &GuessSettings::default())
+            .expect_err("nobody is that tall");
         assert!(e.to_string().contains("no body fits"), "{e}");
     }
 }

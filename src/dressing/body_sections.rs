@@ -1,5 +1,6 @@
 //! Cross-sections of a body in the canonical pose, for placing panels around it.
 
+use super::settings::SectionSettings;
 use std::ops::Range;
 use tryon_body::measure::Measurements;
 use tryon_body::parts::vertex_masks;
@@ -9,22 +10,8 @@ use tryon_geometry::math::{P3, P3d};
 use tryon_geometry::mesh::Face;
 use tryon_geometry::par::Par;
 
-/// Distance between two cross-sections, metres: wider misses waists, narrower only costs time.
-const SPACING: f32 = 0.01;
-/// Share of the gap between crotch and inseam that trousers climb where thighs touch; at 1 they never come to rest.
-const FORK_RISE: f32 = 0.5;
 /// Heights of hip joints and shoulders over stature, for skeletons without these joints (ANSUR II).
 const JOINT_HEIGHTS: [f32; 2] = [0.52, 0.8];
-/// Half width of the sagittal strip in which the crotch is searched, metres; a wider one meets the thighs.
-const CROTCH_STRIP: f32 = 0.012;
-/// Lowest height of a crotch over stature: below are knees and feet.
-const LOWEST_CROTCH: f32 = 0.3;
-/// Crotch below the hip joints where no skin is found in the strip, metres.
-const CROTCH_DROP: f32 = 0.08;
-/// Heights above the crotch between which the hip is widest: from (m), to [share of the trunk].
-const HIP_RANGE: (f32, f32) = (0.02, 0.32);
-/// Heights above the crotch between which the waist is narrowest, shares of the trunk.
-const WAIST_RANGE: Range<f32> = 0.30..0.62;
 
 /// One horizontal cross-section: its bounding box and the girth of its convex hull (as a tape measures it), metres.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -55,15 +42,23 @@ impl CrossSection {
 }
 
 /// Cross-sections from the lowest to the highest point of some parts of a body.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug)]
 pub(super) struct SectionStack {
+    /// Distance between two of them, metres.
+    spacing: f32,
     bottom: f32,
     sections: Vec<Option<CrossSection>>,
 }
 
 impl SectionStack {
-    /// Cuts the faces whose three corners belong to `mask`; `parts` per vertex.
-    pub(super) fn cut(vertices: &[P3], faces: &[Face], parts: &[u8], mask: Region) -> Self {
+    /// Cuts the faces whose three corners belong to `mask` every `spacing` metres; `parts` per vertex.
+    pub(super) fn cut(
+        vertices: &[P3],
+        faces: &[Face],
+        parts: &[u8],
+        mask: Region,
+        spacing: f32,
+    ) -> Self {
         let keep = |f: &&Face| f.iter().all(|v| parts[*v as usize] & mask.0 != 0);
         let (lo, hi) = height_range(
             faces
@@ -73,17 +68,21 @@ impl SectionStack {
                 .map(|v| &vertices[*v as usize]),
         );
         if lo > hi {
-            return Self::default();
+            return Self {
+                spacing,
+                bottom: 0.0,
+                sections: Vec::new(),
+            };
         }
-        let n = ((hi - lo) / SPACING) as usize + 1;
+        let n = ((hi - lo) / spacing) as usize + 1;
         let mut points: Vec<Vec<[f32; 2]>> = vec![Vec::new(); n];
         for f in faces.iter().filter(keep) {
             for k in 0..3 {
                 let (a, b) = (&vertices[f[k] as usize], &vertices[f[(k + 1) % 3] as usize]);
                 let (a, b) = if a.y <= b.y { (a, b) } else { (b, a) };
-                let first = ((a.y - lo) / SPACING).ceil() as usize;
+                let first = ((a.y - lo) / spacing).ceil() as usize;
                 for (s, slot) in points.iter_mut().enumerate().skip(first) {
-                    let y = lo + s as f32 * SPACING;
+                    let y = lo + s as f32 * spacing;
                     if y > b.y {
                         break;
                     }
@@ -98,6 +97,7 @@ impl SectionStack {
         }
         let sections = points.into_iter().map(CrossSection::of).collect();
         Self {
+            spacing,
             bottom: lo,
             sections,
         }
@@ -105,7 +105,7 @@ impl SectionStack {
     /// Cross-section nearest to height `y` (m); beyond the ends the last one.
     pub(super) fn at(&self, y: f32) -> CrossSection {
         let last = self.sections.len().saturating_sub(1);
-        let i = (((y - self.bottom) / SPACING).round().max(0.0) as usize).min(last);
+        let i = (((y - self.bottom) / self.spacing).round().max(0.0) as usize).min(last);
         let found = self.sections.get(i).copied().flatten();
         found
             .or_else(|| self.sections.iter().flatten().copied().next())
@@ -113,14 +113,14 @@ impl SectionStack {
     }
     /// True for a height between the lowest and the highest cross-section, metres.
     pub(super) fn covers(&self, y: f32) -> bool {
-        let height = self.sections.len().saturating_sub(1) as f32 * SPACING;
+        let height = self.sections.len().saturating_sub(1) as f32 * self.spacing;
         !self.sections.is_empty() && (self.bottom..=self.bottom + height).contains(&y)
     }
     /// Height in `range` (m) at which `key` of the cross-section is smallest.
     pub(super) fn argmin(&self, range: Range<f32>, key: impl Fn(&CrossSection) -> f32) -> f32 {
-        let n = ((range.end - range.start) / SPACING).max(0.0) as usize;
+        let n = ((range.end - range.start) / self.spacing).max(0.0) as usize;
         (0..=n)
-            .map(|i| range.start + i as f32 * SPACING)
+            .map(|i| range.start + i as f32 * self.spacing)
             .min_by(|a, b| key(&self.at(*a)).total_cmp(&key(&self.at(*b))))
             .unwrap_or(range.start)
     }
@@ -188,8 +188,9 @@ impl BodySections {
         template: &Template,
         rest: &RestBody,
         measures: Option<&Measurements>,
+        settings: &SectionSettings,
     ) -> Self {
-        let pose = super::canonical::canonical_pose(template, rest);
+        let pose = super::canonical::canonical_pose(template, rest, &settings.canonical);
         let mut bones = BoneTransforms::default();
         pose.bones(template.skeleton(), rest, &mut bones);
         let mut vertices = Vec::new();
@@ -202,7 +203,8 @@ impl BodySections {
         );
         let parts = vertex_masks(template);
         let faces = template.mesh().faces();
-        let cut = |mask| SectionStack::cut(&vertices, faces, &parts, mask);
+        let spacing = settings.spacing;
+        let cut = |mask| SectionStack::cut(&vertices, faces, &parts, mask, spacing);
         let mut out = Self {
             trunk: cut(Region::TRUNK),
             lower: cut(Region::TRUNK.with(Region::LEFT_LEG).with(Region::RIGHT_LEG)),
@@ -215,11 +217,16 @@ impl BodySections {
         // Legs turn about the hips: the crotch keeps its height.
         let (floor, _) = height_range(rest.vertices.iter());
         let inseam = measures.map(|m| floor + m.inseam as f32);
-        out.heights = out.measure_heights(template, inseam);
+        out.heights = out.measure_heights(template, inseam, settings);
         out
     }
     /// `inseam`: height at which the thighs part, metres.
-    fn measure_heights(&self, template: &Template, inseam: Option<f32>) -> BodyHeights {
+    fn measure_heights(
+        &self,
+        template: &Template,
+        inseam: Option<f32>,
+        settings: &SectionSettings,
+    ) -> BodyHeights {
         let (lo, hi) = height_range(self.vertices.iter());
         let stature = hi - lo;
         let joint_height = |names: [&str; 2], share: f32| {
@@ -235,30 +242,27 @@ impl BodySections {
             .iter()
             .zip(&self.parts)
             .filter(|(p, part)| {
-                p.x.abs() < CROTCH_STRIP
+                p.x.abs() < settings.crotch_strip
                     && *part & lower.0 != 0
-                    && p.y > lo + LOWEST_CROTCH * stature
+                    && p.y > lo + settings.lowest_crotch * stature
             })
             .map(|(p, _)| p.y)
             .fold(f32::MAX, f32::min);
         let crotch = if lowest < hi {
             lowest
         } else {
-            pelvis - CROTCH_DROP
+            pelvis - settings.crotch_drop
         };
         let trunk = shoulder - crotch;
         let above = |share: f32| crotch + share * trunk;
+        let ([low, high], [from, to]) = (settings.hip_range, settings.waist_range);
         BodyHeights {
-            hip: self
-                .lower
-                .argmin(crotch + HIP_RANGE.0..above(HIP_RANGE.1), |s| -s.girth),
-            waist: self
-                .lower
-                .argmin(above(WAIST_RANGE.start)..above(WAIST_RANGE.end), |s| {
-                    s.girth
-                }),
+            hip: self.lower.argmin(crotch + low..above(high), |s| -s.girth),
+            waist: self.lower.argmin(above(from)..above(to), |s| s.girth),
             crotch,
-            fork: inseam.map_or(crotch, |y| crotch + FORK_RISE * (y - crotch).max(0.0)),
+            fork: inseam.map_or(crotch, |y| {
+                crotch + settings.fork_rise * (y - crotch).max(0.0)
+            }),
         }
     }
 }
@@ -294,7 +298,7 @@ mod tests {
     fn sections_of_a_cylinder_have_its_girth_and_box() {
         let (vertices, faces) = tube(0.1, 0.1);
         let parts = vec![Region::TRUNK.0; vertices.len()];
-        let stack = SectionStack::cut(&vertices, &faces, &parts, Region::TRUNK);
+        let stack = SectionStack::cut(&vertices, &faces, &parts, Region::TRUNK, 0.01);
         for y in [0.0, 0.155, 0.3] {
             let s = stack.at(y);
             assert!((s.girth - TAU * 0.1).abs() < 2e-4, "{s:?}");
@@ -307,7 +311,7 @@ mod tests {
     fn parts_that_a_body_lacks_have_an_empty_section() {
         let (vertices, faces) = tube(0.1, 0.1);
         let parts = vec![Region::TRUNK.0; vertices.len()];
-        let none = SectionStack::cut(&vertices, &faces, &parts, Region::LEFT_LEG);
+        let none = SectionStack::cut(&vertices, &faces, &parts, Region::LEFT_LEG, 0.01);
         assert_eq!(none.at(0.1), CrossSection::default());
         assert_eq!(CrossSection::of(Vec::new()), None);
     }

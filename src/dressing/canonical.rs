@@ -1,16 +1,17 @@
 //! The canonical pose in which garments are put on: upright, arms out and a little down, legs a little apart.
 
+use super::settings::CanonicalSettings;
 use nalgebra::{Unit, UnitQuaternion, Vector3};
 use tryon_body::{JointMotion, Pose, RestBody, Template};
 use tryon_geometry::math::{Body, Rigid, V3d, World, log_so3};
 
-/// Upper arms below the horizontal, radians: armpits open, shoulders not shrugged.
-const ARMS_DOWN: f64 = 0.60;
-/// Legs from the vertical, radians.
-const LEGS_OUT: f64 = 0.10;
-
 /// Joint angles of the canonical pose, in the template's own frame (root identity).
-pub(super) fn canonical_pose(template: &Template, rest: &RestBody) -> Pose<Body> {
+pub(super) fn canonical_pose(
+    template: &Template,
+    rest: &RestBody,
+    settings: &CanonicalSettings,
+) -> Pose<Body> {
+    let (down, out) = (settings.arms_down, settings.legs_out);
     let mut aim = Aim {
         template,
         rest,
@@ -20,8 +21,8 @@ pub(super) fn canonical_pose(template: &Template, rest: &RestBody) -> Pose<Body>
         },
     };
     for (side, s) in [("left", 1.0), ("right", -1.0)] {
-        let arm = Vector3::new(s * ARMS_DOWN.cos(), -ARMS_DOWN.sin(), 0.0);
-        let leg = Vector3::new(s * LEGS_OUT.sin(), -LEGS_OUT.cos(), 0.0);
+        let arm = Vector3::new(s * down.cos(), -down.sin(), 0.0);
+        let leg = Vector3::new(s * out.sin(), -out.cos(), 0.0);
         for (limb, wanted) in [
             (["shoulder", "elbow", "wrist"], arm),
             (["hip", "knee", "ankle"], leg),

@@ -62,7 +62,7 @@ pub fn dress_all(
 
     let timer = Instant::now();
     let measures = measure(template, rest).ok();
-    let sections = BodySections::new(template, rest, measures.as_ref());
+    let sections = BodySections::new(template, rest, measures.as_ref(), &options.stages.sections);
     report.stages_ms.place = ms(timer);
 
     let timer = Instant::now();

@@ -1,10 +1,9 @@
 //! Measures of a finished garment in one size, the input of size advice.
 
+use super::settings::SizeSettings;
 use tryon_body::measure::Measurements;
 use tryon_garment::{GarmentKind, Material, Pattern, Placement, Size};
 
-/// Least ease at chest, waist and hip, metres: a waistband needs none, it sits lower on a fuller body.
-pub(super) const LEAST_EASE: [f64; 3] = [0.04, -0.03, 0.02];
 /// Height of the high point of the shoulder over stature: cervicale height 1.521 m at 1.756 m (ANSUR II, men; women's
 /// 0.864), a finger below.
 const SHOULDER_POINT: f64 = 0.862;
@@ -66,8 +65,8 @@ pub struct FinishedGarment {
     pub material: Material,
     /// Girths at chest, waist and hip, metres; 0 where it has none.
     pub girths: [f64; 3],
-    /// Least ease there by design, metres.
-    pub least_ease: [f64; 3],
+    /// Least ease there by design, and limits of the fit.
+    pub settings: SizeSettings,
     /// Lowest hem; `None` for cloth that hangs from no place.
     pub hem: Option<Hem>,
 }
@@ -80,7 +79,7 @@ impl From<&Pattern> for FinishedGarment {
             size: pattern.size,
             material: pattern.material.clone(),
             girths: pattern.finished,
-            least_ease: LEAST_EASE,
+            settings: SizeSettings::default(),
             hem: hem(pattern),
         }
     }

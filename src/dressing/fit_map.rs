@@ -3,6 +3,7 @@
 //! Pressure follows from balance: the skin carries the force of the stretched cloth and its weight. Positions suffice, so any
 //! solver's state will do; in fast motion inertia reads as pressure.
 
+use super::settings::FitMapSettings;
 use super::suggest::FitClass;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
@@ -55,18 +56,6 @@ pub struct FitMap {
     pub regions: Vec<RegionFit>,
 }
 
-/// Cloth this much farther off the skin than its layer's own distance still touches, metres.
-const TOUCH: f32 = 3e-3;
-/// Stretch (95th percentile) from which a region is tight: a woven fabric's comfortable limit, a third of the 12 % and more
-/// that skin strains at joints (Kirk & Ibrahim 1966).
-const TIGHT_STRETCH: f64 = 0.05;
-/// Mean pressure from which a region is tight, Pa: a waistband is felt but tolerated at 1 to 2 kPa, and 6 to 10 kPa are
-/// uncomfortable (Denton 1972).
-const TIGHT_PRESSURE: f64 = 1_000.0;
-/// Mean distance from which a region is loose, metres: 19 cm of girth.
-const LOOSE_GAP: f64 = 0.03;
-/// Least cloth from which a region is reported, m²: a hand's breadth square.
-const LEAST_AREA: f64 = 0.006;
 /// Percentile of stretch and pressure that is reported; the maximum is noise of single vertices.
 const PERCENTILE: usize = 95;
 /// Gravity, m/s².
@@ -77,11 +66,11 @@ pub const FIT_COLORS: [[u8; 3]; 3] = [[58, 104, 190], [96, 168, 96], [206, 58, 4
 
 impl VertexFit {
     /// From −1 (loose) by 0 (follows the body) to 1 (tight).
-    pub fn tightness(&self) -> f32 {
-        let tight = (self.stretch / TIGHT_STRETCH as f32)
-            .max(self.pressure / TIGHT_PRESSURE as f32)
+    pub fn tightness(&self, limits: &FitMapSettings) -> f32 {
+        let tight = (self.stretch / limits.tight_stretch as f32)
+            .max(self.pressure / limits.tight_pressure as f32)
             .clamp(0.0, 1.0);
-        let loose = (self.gap / LOOSE_GAP as f32).clamp(0.0, 1.0);
+        let loose = (self.gap / limits.loose_gap as f32).clamp(0.0, 1.0);
         if tight >= loose {
             tight
         } else {
@@ -89,9 +78,9 @@ impl VertexFit {
         }
     }
     /// Blue where loose, green where fitted, red where tight, sRGB.
-    pub fn color(&self) -> [u8; 3] {
+    pub fn color(&self, limits: &FitMapSettings) -> [u8; 3] {
         let [loose, fitted, tight] = FIT_COLORS.map(|c| c.map(f32::from));
-        let t = self.tightness();
+        let t = self.tightness(limits);
         let to = if t >= 0.0 { tight } else { loose };
         std::array::from_fn(|k| (fitted[k] + (to[k] - fitted[k]) * t.abs()).round() as u8)
     }
@@ -100,6 +89,8 @@ impl VertexFit {
 /// Probe that measures the fit of an outfit; keeps the nearest skin of each vertex between queries.
 #[derive(Debug)]
 pub struct FitProbe {
+    /// Limits of the classes.
+    pub settings: FitMapSettings,
     sheets: Vec<Sheet>,
     /// Region number of each body vertex.
     region: Vec<u8>,
@@ -151,6 +142,7 @@ impl FitProbe {
         let n = template.mesh().vertices().len();
         let garments = &model.outfit.garments;
         Ok(Self {
+            settings: FitMapSettings::default(),
             sheets: garments
                 .iter()
                 .map(Sheet::of_garment)
@@ -202,6 +194,7 @@ impl FitProbe {
                 surface,
                 frame: &self.frame,
                 offset: model.offset(k) as f32,
+                settings: &self.settings,
             };
             let near = &mut self.nearest[k];
             let vertices = worn.vertex_fits(near);
@@ -221,6 +214,7 @@ struct WornGarment<'a> {
     frame: &'a SurfaceFrame,
     /// Distance of its layer from the skin, metres.
     offset: f32,
+    settings: &'a FitMapSettings,
 }
 
 impl WornGarment<'_> {
@@ -255,7 +249,7 @@ impl WornGarment<'_> {
                 near[i] = c.vertex;
                 let a = area[i].max(f64::MIN_POSITIVE);
                 let gap = c.signed_distance.max(0.0);
-                let pressure = if gap < self.offset + TOUCH {
+                let pressure = if gap < self.offset + self.settings.touch {
                     // −gradient + weight + skin = 0 along the normal.
                     let force = gradient[i] - GRAVITY * self.sheet.mass[i];
                     c.normal.cast::<f64>().dot(&force).max(0.0) / a
@@ -272,6 +266,7 @@ impl WornGarment<'_> {
     }
     /// Fit of each region that has enough cloth; `region` per body vertex.
     fn region_fits(&self, fits: &[VertexFit], near: &[u32], region: &[u8]) -> Vec<RegionFit> {
+        let limits = self.settings;
         let mut area = vec![0.0f64; fits.len()];
         for e in &self.sheet.elements {
             e.v.iter().for_each(|v| area[*v as usize] += e.area / 3.0);
@@ -285,7 +280,7 @@ impl WornGarment<'_> {
                 .filter(|i| usize::from(region[near[*i] as usize]) == r)
                 .collect();
             let total: f64 = own.iter().map(|i| area[*i]).sum();
-            if total < LEAST_AREA {
+            if total < limits.least_area {
                 continue;
             }
             let most = |value: &dyn Fn(&VertexFit) -> f32| {
@@ -308,9 +303,9 @@ impl WornGarment<'_> {
             };
             let pressure = [on_skin, most(&|v| v.pressure)];
             let gap = mean(&|v| v.gap);
-            let fit = if stretch[1] > TIGHT_STRETCH || pressure[0] > TIGHT_PRESSURE {
+            let fit = if stretch[1] > limits.tight_stretch || pressure[0] > limits.tight_pressure {
                 FitClass::Tight
-            } else if gap > LOOSE_GAP {
+            } else if gap > limits.loose_gap {
                 FitClass::Loose
             } else {
                 FitClass::Fitted
@@ -450,22 +445,23 @@ mod tests {
             (p - expected).abs() < 0.05 * expected,
             "{p} Pa, {expected} expected"
         );
+        let limits = FitMapSettings::default();
         assert!(
             middle
                 .iter()
-                .all(|v| v.tightness() > 0.5 && v.color()[0] > v.color()[2])
+                .all(|v| v.tightness(&limits) > 0.5 && v.color(&limits)[0] > v.color(&limits)[2])
         );
     }
 
     #[test]
     fn a_tube_off_the_body_has_no_pressure_and_its_gap_is_the_distance() {
-        let fit = worn(TAU * 0.15, 0.15);
+        let (fit, limits) = (worn(TAU * 0.15, 0.15), FitMapSettings::default());
         for v in fit.iter().skip(64 * 5).take(64 * 10) {
             assert!(
                 v.pressure == 0.0 && (v.gap - 0.05).abs() < 1e-3 && v.stretch.abs() < 2e-3,
                 "{v:?}"
             );
-            assert!(v.tightness() < -0.9 && v.color()[2] > v.color()[0]);
+            assert!(v.tightness(&limits) < -0.9 && v.color(&limits)[2] > v.color(&limits)[0]);
         }
     }
 }

@@ -3,6 +3,7 @@
 //! A placed hood is free of itself, but lies back in three layers with edges far from their lengths. Released, it would spring
 //! through itself, and three intersecting layers cannot be untangled.
 
+use super::settings::HoodDrapeSettings;
 use tryon_cloth::Sheet;
 use tryon_cloth::contact::SurfaceModel;
 use tryon_cloth::self_contact::{Search, SelfContactFrame, SelfContactModel};
@@ -10,20 +11,10 @@ use tryon_garment::{GarmentError, GarmentMesh, Placement};
 use tryon_geometry::math::{P3, V3, V3d};
 use tryon_geometry::par::Par;
 
-/// Distance of two folds (m); at most a quarter of the edges.
-const THICKNESS: f32 = 0.01;
-/// Distance below which folds are in contact (m). With 18 mm, as in worn garments, hoods have a quarter more intersections
-/// after a second and a half.
-const REACH: f32 = 0.026;
-/// Separation of nearer folds between two queries (m).
-const SEPARATION: f64 = 0.001;
-/// Largest speed (m/s): two millimetres between two queries. Limited only near other folds, one in seven hoods intersects
-/// itself.
-const MAX_SPEED: f64 = 0.3;
-
 /// Hood of one garment with its self-contacts.
 #[derive(Debug)]
 pub(super) struct Hood {
+    settings: HoodDrapeSettings,
     model: SelfContactModel,
     frame: SelfContactFrame,
     search: Search,
@@ -57,7 +48,11 @@ impl FoldContact {
 
 impl Hood {
     /// Hood of a garment, `None` if it has none.
-    pub(super) fn new(mesh: &GarmentMesh, sheet: &Sheet) -> Result<Option<Self>, GarmentError> {
+    pub(super) fn new(
+        mesh: &GarmentMesh,
+        sheet: &Sheet,
+        settings: HoodDrapeSettings,
+    ) -> Result<Option<Self>, GarmentError> {
         let on_hood = |c: &(u16, [f64; 2])| {
             matches!(
                 mesh.placements.get(usize::from(c.0)),
@@ -76,7 +71,8 @@ impl Hood {
         let surface = SurfaceModel::new(mesh.faces.clone(), mesh.topology()?, parts);
         let model = SelfContactModel::new(surface, sheet.edges.iter().map(|e| e.1 as f32));
         Ok(Some(Self {
-            search: model.search_all(THICKNESS, REACH),
+            search: model.search_all(settings.thickness, settings.reach),
+            settings,
             model,
             vertices,
             frame: SelfContactFrame::default(),
@@ -107,13 +103,13 @@ impl Hood {
             };
             let [a, b, c] = self.model.surface.faces()[hit.face as usize];
             let far = f64::from(hit.signed_distance.abs());
-            if far < f64::from(REACH) && ![a, b, c].into_iter().any(&crossing) {
+            if far < f64::from(self.settings.reach) && ![a, b, c].into_iter().any(&crossing) {
                 let [wa, wb, wc] = hit.weights.map(f64::from);
                 self.contacts.push(FoldContact {
                     vertices: [v, a, b, c],
                     weights: [1.0, -wa, -wb, -wc],
                     normal: hit.normal.cast() * f64::from(hit.signed_distance).signum(),
-                    distance: f64::from(self.search.thickness).min(far + SEPARATION),
+                    distance: f64::from(self.search.thickness).min(far + self.settings.separation),
                 });
             }
         }
@@ -137,7 +133,7 @@ impl Hood {
             }
         }
         for v in self.vertices.iter().map(|v| *v as usize) {
-            x[v] = before[v] + (x[v] - before[v]).cap_magnitude(MAX_SPEED * h);
+            x[v] = before[v] + (x[v] - before[v]).cap_magnitude(self.settings.max_speed * h);
         }
     }
 }
@@ -156,7 +152,7 @@ mod tests {
         };
         let mesh = GarmentMesh::sew(&pattern, &how).expect("sewn");
         let sheet = Sheet::of_garment(&mesh).expect("sheet");
-        let hood = Hood::new(&mesh, &sheet).expect("manifold");
+        let hood = Hood::new(&mesh, &sheet, HoodDrapeSettings::default()).expect("manifold");
         (mesh, hood)
     }
 
@@ -230,7 +226,7 @@ mod tests {
         hood.resolve(&mut x, &before, |_| 1.0, 2e-3);
         for (v, (x, before)) in x.iter().zip(&before).enumerate() {
             let most = if hood.vertices.contains(&(v as u32)) {
-                MAX_SPEED * 2e-3
+                hood.settings.max_speed * 2e-3
             } else {
                 0.1
             };

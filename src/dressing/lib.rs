@@ -25,6 +25,8 @@
 //!
 //! # Ideas
 //!
+//! Settings of all stages, with units, defaults and effects: [`mod@settings`].
+//!
 //! - The order of it: [`mod@dress`].
 //! - Size recommended, with its reason: [`mod@suggest`], from the measures in [`mod@finished`].
 //! - Panels around trunk, legs, arms, head: [`mod@place::trunk`], [`mod@place::leg`], [`mod@place::sleeve`],
@@ -57,6 +59,7 @@ mod plane;
 mod refine;
 mod retarget;
 mod rig_standing;
+pub mod settings;
 mod sew;
 mod skin;
 mod source_body;
@@ -70,6 +73,7 @@ pub use fit_map::{FIT_COLORS, FitMap, FitProbe, RegionFit, VertexFit};
 pub use mesh_garment::MeshGarment;
 pub use options::{DressMs, DressOptions, DressReport};
 pub use rig_standing::rig_standing;
+pub use settings::{FitMapSettings, MeshGarmentSettings, SizeSettings, StageSettings};
 pub use sew::GarmentSource;
 pub use source_body::SourceBody;
 pub use suggest::{FitClass, GirthEase, Misfit, Suggestion, assess, check_wearable, suggest};

@@ -1,5 +1,6 @@
 //! Settings and report of dressing.
 
+use super::settings::StageSettings;
 use std::time::Instant;
 use tryon_cloth::Config;
 use tryon_garment::Triangulation;
@@ -16,6 +17,8 @@ pub struct DressOptions {
     /// Remove self-intersections. Without, shirts take about two thirds of the time, and sleeves and trunk intersect in the
     /// armpits.
     pub untangle: bool,
+    /// Settings of the stages.
+    pub stages: StageSettings,
 }
 
 impl Default for DressOptions {
@@ -25,6 +28,7 @@ impl Default for DressOptions {
             config: Config::default(),
             any_size: false,
             untangle: true,
+            stages: StageSettings::default(),
         }
     }
 }

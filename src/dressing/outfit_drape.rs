@@ -5,6 +5,7 @@ use super::drape::{Drape, Layers};
 use super::error::DressError;
 use super::options::{DressOptions, DressReport, ms};
 use super::refine::prolong;
+use super::settings::{CanonicalSettings, DrapeSettings, ScheduleSettings};
 use super::sew::PlacedSheet;
 use super::skin::{Skin, SkinModel};
 use super::waistband::GarmentOnSkin;
@@ -15,30 +16,6 @@ use tryon_cloth::{AnchorBinding, ClothError, Sheet};
 use tryon_garment::GarmentMesh;
 use tryon_geometry::math::{P3, World};
 use tryon_geometry::spatial::intersections;
-
-/// Substep on the coarse mesh, s.
-const COARSE_STEP: f64 = 2e-3;
-/// Substeps that close seams and gaps, and the share of gravity during them.
-const CLOSING: usize = 60;
-const CLOSING_GRAVITY: f64 = 0.1;
-/// Substeps of the first drape, 0.5 s: cloth that started 2 cm off the body hangs.
-const DRAPING: usize = 260;
-/// Bodies from the canonical to the tracked pose and substeps on each; 16 are at most 8° apart for a half-turn of the arm.
-const FOLLOWING: [usize; 2] = [16, 12];
-/// The same with untangling: from farther bodies cloth is moved into other cloth.
-const UNTANGLED_FOLLOWING: [usize; 2] = [24, 8];
-/// Rounds of untangling on each of these bodies.
-const CLEARING: usize = 6;
-/// Most rounds of untangling in the tracked pose; most garments need none.
-const CLEARED: usize = 120;
-/// Substeps in the tracked pose.
-const SETTLING: usize = 80;
-/// Substep on the fine mesh, s.
-const FINE_STEP: f64 = 1e-3;
-/// Substeps on the fine mesh: they add the wrinkles that the coarse one lacks.
-const FINISHING: usize = 90;
-/// Attempts to settle until the fine garment is free of itself off the arms: hoods may fold in a way that nothing untangles.
-const ATTEMPTS: usize = 4;
 
 /// Body on which garments are draped.
 #[derive(Clone, Copy, Debug)]
@@ -70,15 +47,18 @@ pub(super) fn drape_outfit(
 ) -> Result<DrapedOutfit, DressError> {
     let timer = Instant::now();
     let skin = SkinModel::new(wearer.template, &options.config)?;
-    let start = wearer.canonical();
+    let (start, stages) = (
+        wearer.canonical(&options.stages.sections.canonical),
+        &options.stages,
+    );
     for s in &mut sheets {
         let local = std::mem::take(&mut s.positions);
         start.root.points_f32(&local, &mut s.positions);
     }
     let [count, substeps] = if options.untangle {
-        UNTANGLED_FOLLOWING
+        stages.drape.schedule.untangled_following
     } else {
-        FOLLOWING
+        stages.drape.schedule.following
     };
     let bodies = wearer.bodies_between(&start, wearer.pose, count);
     let mut drape = OutfitDrape::new(&skin, sheets, &bodies[0], options)?;
@@ -99,10 +79,10 @@ pub(super) fn drape_outfit(
 
 impl Wearer<'_> {
     /// The canonical pose where the wearer is.
-    fn canonical(&self) -> Pose<World> {
+    fn canonical(&self, settings: &CanonicalSettings) -> Pose<World> {
         Pose {
             root: upright_root(self.rest, &self.pose.root),
-            angles: canonical_pose(self.template, self.rest).angles,
+            angles: canonical_pose(self.template, self.rest, settings).angles,
         }
     }
     /// Posed vertices of `count + 1` bodies from one pose to another, slow at both ends.
@@ -132,6 +112,7 @@ struct OutfitDrape<'a> {
     anchors: Vec<Vec<AnchorBinding>>,
     layers: Layers,
     untangle: bool,
+    settings: DrapeSettings,
 }
 
 impl<'a> OutfitDrape<'a> {
@@ -144,7 +125,7 @@ impl<'a> OutfitDrape<'a> {
     ) -> Result<Self, DressError> {
         let mut skin = Skin::of(skin);
         skin.place(body).map_err(ClothError::from)?;
-        let (count, untangle) = (sheets.len(), options.untangle);
+        let (count, untangle, settings) = (sheets.len(), options.untangle, options.stages.drape);
         let offset = |k| options.config.layer_offset(k, count);
         let offsets: Vec<f64> = (0..count).map(offset).collect();
         let garments = sheets.iter().map(|s| s.garment.clone()).collect();
@@ -153,7 +134,7 @@ impl<'a> OutfitDrape<'a> {
         for (s, offset) in sheets.into_iter().zip(&offsets) {
             let first = s.coarse.clone().unwrap_or(s.garment);
             let sheet = Sheet::of_garment(&first)?;
-            let mut d = Drape::new(&first, &sheet, s.positions);
+            let mut d = Drape::new(&first, &sheet, s.positions, &settings);
             d.find_nearest(&skin);
             let on = on_skin(&skin, &first, *offset);
             anchors.push(on.fasten(&d.positions())?);
@@ -173,6 +154,7 @@ impl<'a> OutfitDrape<'a> {
             coarse,
             anchors,
             untangle,
+            settings,
         })
     }
     fn garment(&self, k: usize) -> GarmentOnSkin<'_> {
@@ -180,16 +162,22 @@ impl<'a> OutfitDrape<'a> {
     }
     /// Drapes in the canonical pose.
     fn hang(&mut self) {
-        let (skin, anchors) = (&self.skin, &self.anchors);
+        let (skin, anchors, schedule) = (&self.skin, &self.anchors, self.settings.schedule);
+        let step = schedule.coarse_step;
         self.layers.each(skin, &self.offsets, |k, d, on| {
             d.pin(&anchors[k], skin.frame());
-            d.run(on, CLOSING, COARSE_STEP, CLOSING_GRAVITY);
+            d.run(on, schedule.closing, step, schedule.closing_gravity);
             d.stop();
-            d.run(on, DRAPING, COARSE_STEP, 1.0);
+            d.run(on, schedule.draping, step, 1.0);
         });
     }
     /// Follows the body through its poses.
     fn follow(&mut self, bodies: &[Vec<P3>], substeps: usize) -> Result<(), ClothError> {
+        let ScheduleSettings {
+            coarse_step,
+            clearing,
+            ..
+        } = self.settings.schedule;
         for w in bodies.windows(2) {
             self.skin.place(&w[1])?;
             let (skin, anchors) = (&self.skin, &self.anchors);
@@ -197,22 +185,29 @@ impl<'a> OutfitDrape<'a> {
                 d.follow_skin(&w[0], &w[1]);
                 d.recover_sleeves(skin);
                 d.pin(&anchors[k], skin.frame());
-                d.run(on, substeps, COARSE_STEP, 1.0);
-                d.untangle_at_rest(on, CLEARING);
+                d.run(on, substeps, coarse_step, 1.0);
+                d.untangle_at_rest(on, clearing);
             });
         }
         Ok(())
     }
     /// Settles in the tracked pose and refines, again while the fine garments intersect themselves off the arms.
     fn finish(&mut self, report: &mut DressReport) -> Result<Layers, DressError> {
+        let ScheduleSettings {
+            attempts,
+            settling,
+            coarse_step,
+            cleared,
+            ..
+        } = self.settings.schedule;
         let mut fine = Layers::default();
-        for _ in 0..ATTEMPTS {
+        for _ in 0..attempts {
             let timer = Instant::now();
             let skin = &self.skin;
             self.layers.each(skin, &self.offsets, |_, d, on| {
                 d.recover_sleeves(skin);
-                d.run(on, SETTLING, COARSE_STEP, 1.0);
-                d.untangle_at_rest(on, CLEARED);
+                d.run(on, settling, coarse_step, 1.0);
+                d.untangle_at_rest(on, cleared);
             });
             report.stages_ms.coarse += ms(timer);
             let timer = Instant::now();
@@ -254,7 +249,7 @@ impl<'a> OutfitDrape<'a> {
             );
             let sheet = Sheet::of_garment(on.mesh)?;
             let x = x.iter().map(|p| P3::from(p.cast::<f32>())).collect();
-            let mut d = Drape::new(on.mesh, &sheet, x);
+            let mut d = Drape::new(on.mesh, &sheet, x, &self.settings);
             d.find_nearest_from(&self.skin, rough);
             d.pin(&on.fasten(&d.positions())?, self.skin.frame());
             drapes.push(if self.untangle {
@@ -263,15 +258,21 @@ impl<'a> OutfitDrape<'a> {
                 d
             });
         }
+        let ScheduleSettings {
+            fine_step,
+            finishing,
+            cleared,
+            ..
+        } = self.settings.schedule;
         let mut fine = Layers::new(&self.garments, drapes)?;
         fine.each(&self.skin, &self.offsets, |_, d, on| {
             d.recover_sleeves(&self.skin);
-            d.untangle_at_rest(on, CLEARED);
-            d.run(on, FINISHING, FINE_STEP, 1.0);
-            if d.untangle_at_rest(on, CLEARED) > 0 {
+            d.untangle_at_rest(on, cleared);
+            d.run(on, finishing, fine_step, 1.0);
+            if d.untangle_at_rest(on, cleared) > 0 {
                 // Smoothed cloth is compressed, and spreads.
-                d.run(on, FINISHING / 2, FINE_STEP, 1.0);
-                d.untangle_at_rest(on, CLEARED);
+                d.run(on, finishing / 2, fine_step, 1.0);
+                d.untangle_at_rest(on, cleared);
             }
             d.lift_deep(&self.skin);
         });
@@ -302,7 +303,7 @@ mod tests {
             root: Rigid::identity(),
             angles,
         };
-        let a = pose(canonical_pose(&t, &rest).angles);
+        let a = pose(canonical_pose(&t, &rest, &CanonicalSettings::default()).angles);
         let b = pose(vec![0.0; a.angles.len()]);
         let wearer = Wearer {
             template: &t,

@@ -4,21 +4,13 @@
 
 use super::body_sections::BodySections;
 use super::bone_map::{BoneMap, bone_maps};
+use super::settings::RetargetSettings;
 use tryon_body::Template;
 use tryon_body::parts::vertex_masks;
 use tryon_garment::Region;
 use tryon_geometry::math::{P3, P3d, V3, V3d};
 use tryon_geometry::mesh::smoothing::mean;
 use tryon_geometry::spatial::PointTree;
-
-/// Target skin farther than this from the mapped source skin is not its counterpart, metres: a belly's depth.
-const REACH: f32 = 0.15;
-/// Least cosine between the normals of two skins that correspond.
-const SAME_SIDE: f32 = 0.3;
-/// Offset along the normals before the search, metres: it moves the other side of a limb farther away.
-const OFFSET: f32 = 0.04;
-/// Smoothing rounds of the skin residual in the first and the second pass, one edge (1 cm) a round.
-const SMOOTHING: [usize; 2] = [30, 8];
 
 /// Map from a source body in its rest pose to a target body in the canonical pose.
 #[derive(Clone, Debug)]
@@ -30,15 +22,20 @@ pub(super) struct Retargeting {
 }
 
 impl Retargeting {
-    pub(super) fn new(source: &Template, target: &Template, sections: &BodySections) -> Self {
+    pub(super) fn new(
+        source: &Template,
+        target: &Template,
+        sections: &BodySections,
+        settings: &RetargetSettings,
+    ) -> Self {
         let n = source.mesh().vertices().len();
         let mut out = Self {
             bones: bone_maps(source, target, sections),
             residual: vec![V3d::zeros(); n],
         };
         let parts = vertex_masks(source);
-        let skin = TargetSkin::new(target, sections);
-        for rounds in SMOOTHING {
+        let skin = TargetSkin::new(target, sections, settings);
+        for rounds in settings.smoothing {
             let mapped: Vec<P3> = (0..n).map(|i| out.skin_vertex(source, i)).collect();
             let normals = source.normals(&mapped);
             let mut gaps: Vec<Option<V3d>> = (0..n)
@@ -88,10 +85,11 @@ struct TargetSkin<'a> {
     normals: Vec<V3>,
     /// Part, its vertices, and a tree over them.
     parts: Vec<(Region, Vec<usize>, PointTree)>,
+    settings: &'a RetargetSettings,
 }
 
 impl<'a> TargetSkin<'a> {
-    fn new(target: &Template, sections: &'a BodySections) -> Self {
+    fn new(target: &Template, sections: &'a BodySections, settings: &'a RetargetSettings) -> Self {
         let (vertices, normals) = (&sections.vertices, target.normals(&sections.vertices));
         let search = |part: Region| {
             let own: Vec<usize> = (0..sections.parts.len())
@@ -99,7 +97,7 @@ impl<'a> TargetSkin<'a> {
                 .collect();
             let points: Vec<P3> = own
                 .iter()
-                .map(|i| vertices[*i] + normals[*i] * OFFSET)
+                .map(|i| vertices[*i] + normals[*i] * settings.offset)
                 .collect();
             (part, own, PointTree::new(&points))
         };
@@ -116,21 +114,29 @@ impl<'a> TargetSkin<'a> {
             vertices,
             normals,
             parts,
+            settings,
         }
     }
     /// Displacement from `p` to the target skin along its normal; `None` without a counterpart in the same part.
     fn gap(&self, part: u8, p: &P3, normal: &V3) -> Option<V3d> {
         let (_, own, tree) = self.parts.iter().find(|(r, ..)| part & r.0 != 0)?;
-        let (k, _) = tree.nearest(&(p + normal * OFFSET), REACH)?;
+        let &RetargetSettings {
+            reach,
+            same_side,
+            offset,
+            ..
+        } = self.settings;
+        let (k, _) = tree.nearest(&(p + normal * offset), reach)?;
         let (q, m) = (self.vertices[own[k]], self.normals[own[k]]);
         // Across the skin only: along it the bone maps are more exact.
-        (m.dot(normal) > SAME_SIDE).then(|| (m * m.dot(&(q - p))).cast())
+        (m.dot(normal) > same_side).then(|| (m * m.dot(&(q - p))).cast())
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::settings::SectionSettings;
     use tryon_body::{BodyShape, embedded};
 
     #[test]
@@ -142,8 +148,8 @@ mod tests {
                 coefficients: coefficients.to_vec(),
                 ..BodyShape::default()
             });
-            let sections = BodySections::new(&t, &rest, None);
-            let map = Retargeting::new(&t, &t, &sections);
+            let sections = BodySections::new(&t, &rest, None, &SectionSettings::default());
+            let map = Retargeting::new(&t, &t, &sections, &RetargetSettings::default());
             let parts = vertex_masks(&t);
             let trunk: Vec<usize> = (0..parts.len())
                 .filter(|i| parts[*i] == Region::TRUNK.0)

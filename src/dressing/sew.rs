@@ -5,19 +5,13 @@ use super::error::DressError;
 use super::finished::FinishedGarment;
 use super::mesh_garment::MeshGarment;
 use super::options::DressOptions;
-use super::place::place;
+use super::place::{PlacedBody, place};
+use super::settings::SewSettings;
 use super::suggest::check_wearable;
 use tryon_body::Template;
 use tryon_body::measure::Measurements;
 use tryon_garment::{AnchorKind, GarmentMesh, Pattern, Size, Triangulation, library};
 use tryon_geometry::math::P3;
-
-/// Edge length of the mesh that is draped first over that of the garment: four times fewer vertices.
-const COARSER: f64 = 2.0;
-/// The same for hoods; from shorter edges worn hoods intersect themselves more (docs/benchmarks.md).
-const HOOD_COARSER: f64 = 2.2;
-/// Longest edge of the mesh that is draped first, metres: longer ones lose sleeves.
-const COARSEST: f64 = 0.045;
 
 /// A garment to put on.
 #[derive(Clone, Copy, Debug)]
@@ -102,25 +96,41 @@ impl Sewing<'_> {
         Ok(checked.unwrap_or(Ok(()))?)
     }
     fn sew_pattern(&self, pattern: &Pattern) -> Result<PlacedSheet, DressError> {
+        let in_settings = |g| FinishedGarment {
+            settings: self.options.stages.size,
+            ..g
+        };
         let of_size = |s| {
             let other = library::pattern(&pattern.name, s).ok()?;
-            Some(FinishedGarment::from(&other))
+            Some(in_settings(FinishedGarment::from(&other)))
         };
-        self.check(&FinishedGarment::from(pattern), of_size)?;
-        let fine = &self.options.triangulation;
+        self.check(&in_settings(FinishedGarment::from(pattern)), of_size)?;
+        let (fine, stages) = (&self.options.triangulation, &self.options.stages);
+        let SewSettings {
+            coarser,
+            hood_coarser,
+            coarsest,
+        } = stages.sew;
         // Slim triangles are allowed: nothing is simulated on this mesh later.
         let coarse = GarmentMesh::sew(
             pattern,
             &Triangulation {
-                edge_length: (fine.edge_length * COARSER)
-                    .min(COARSEST)
+                edge_length: (fine.edge_length * coarser)
+                    .min(coarsest)
                     .max(fine.edge_length),
-                hood_length: fine.hood_length * HOOD_COARSER,
+                hood_length: fine.hood_length * hood_coarser,
                 min_angle: 0.0,
+                ..*fine
             },
         )?;
+        let body = PlacedBody {
+            template: self.template,
+            sections: self.sections,
+            pattern,
+            settings: &stages.place,
+        };
         Ok(PlacedSheet {
-            positions: place(self.template, self.sections, pattern, &coarse),
+            positions: place(&body, &coarse),
             garment: GarmentMesh::sew(pattern, fine)?,
             coarse: Some(coarse),
         })

@@ -4,6 +4,7 @@ use super::body_guess::{guess, locate};
 use super::error::MeshGarmentError;
 use super::file_frame::FileFrame;
 use super::rig_standing::rig_standing;
+use super::settings::GuessSettings;
 use std::path::Path;
 use std::sync::Arc;
 use tryon_body::import::template_from_smpl;
@@ -81,7 +82,14 @@ impl SourceBody {
     /// # Errors
     /// When no body fits into them.
     pub fn guess(garment: &[P3]) -> Result<Self, MeshGarmentError> {
-        let (template, frame) = guess(&embedded::template(), garment)?;
+        Self::guess_with(garment, &GuessSettings::default())
+    }
+    /// As [`Self::guess`], with other settings.
+    ///
+    /// # Errors
+    /// As [`Self::guess`].
+    pub fn guess_with(garment: &[P3], settings: &GuessSettings) -> Result<Self, MeshGarmentError> {
+        let (template, frame) = guess(&embedded::template(), garment, settings)?;
         let stature = template.mesh().bounds().map_or(0.0, |(lo, hi)| hi.y - lo.y);
         let description = format!(
             "a guess: our body, {:.0} cm tall, its floor {:.0} cm below the file's zero",
@@ -107,8 +115,8 @@ impl SourceBody {
         }
     }
     /// The same body under a garment whose file has a unit and place of its own.
-    pub(super) fn under(self, garment: &[P3]) -> Self {
-        let frame = locate(&self.template, garment);
+    pub(super) fn under(self, garment: &[P3], settings: &GuessSettings) -> Self {
+        let frame = locate(&self.template, garment, settings);
         Self { frame, ..self }
     }
     /// Metres in a unit of the file.

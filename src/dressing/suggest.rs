@@ -55,12 +55,8 @@ pub struct Suggestion {
     pub reason: String,
 }
 
-/// Ease beyond the least from which a place counts as loose, metres: two sizes of the table.
-const LOOSE: f64 = 0.14;
 /// Height of the middle of the knee over stature (ANSUR II: 0.49 m at 1.756 m).
 const KNEE_HEIGHT: f64 = 0.279;
-/// Hem height from which trousers are shorts, metres.
-const SHORTS: f64 = 0.25;
 
 /// Girths of a body at chest, waist and hip, metres.
 pub(super) fn body_girths(body: &Measurements) -> [f64; 3] {
@@ -73,15 +69,15 @@ fn girth_eases(garment: &FinishedGarment, body: &Measurements) -> Vec<GirthEase>
     (0..3)
         .filter(|&k| garment.girths[k] > 0.0)
         .map(|k| {
-            let spare = garment.girths[k] - girths[k] - garment.least_ease[k];
+            let spare = garment.girths[k] - girths[k] - garment.settings.least_ease[k];
             GirthEase {
                 place: ["chest", "waist", "hip"][k],
                 body: girths[k],
                 garment: garment.girths[k],
-                least_ease: garment.least_ease[k],
+                least_ease: garment.settings.least_ease[k],
                 fit: if spare < 0.0 {
                     FitClass::Tight
-                } else if spare > LOOSE {
+                } else if spare > garment.settings.loose {
                     FitClass::Loose
                 } else {
                     FitClass::Fitted
@@ -166,9 +162,6 @@ fn advice(better: Option<Size>) -> String {
     )
 }
 
-/// Girth that a waistband may lack, metres: it sits lower, or its button moves.
-const SITS_LOWER: f64 = 0.03;
-
 /// Checks that a body can wear a garment: it closes with the stretch of its fabric, and is held up. `of_size` gives its
 /// other sizes.
 ///
@@ -208,7 +201,7 @@ fn misfit(finished: &FinishedGarment, body: &Measurements) -> Option<Misfit> {
         .map(|r| {
             let gives = r.garment * finished.material.comfortable_strain();
             let lower = if held && r.place == "waist" {
-                SITS_LOWER
+                finished.settings.sits_lower
             } else {
                 0.0
             };
@@ -265,7 +258,9 @@ pub fn assess(garment: &FinishedGarment, body: &Measurements) -> Suggestion {
     let length = match garment.kind {
         GarmentKind::Top => (hem - body.inseam, "the crotch"),
         GarmentKind::Skirt | GarmentKind::Dress => (hem - KNEE_HEIGHT * body.stature, "the knee"),
-        GarmentKind::Trousers if hem > SHORTS => (hem - KNEE_HEIGHT * body.stature, "the knee"),
+        GarmentKind::Trousers if hem > garment.settings.shorts => {
+            (hem - KNEE_HEIGHT * body.stature, "the knee")
+        }
         GarmentKind::Trousers => (hem, "the floor"),
     };
     let ease_text = tightest.map_or_else(String::new, |r| {

@@ -7,6 +7,7 @@
 //! - Triangles of a panel: [`mod@triangulate`].
 //! - Fabrics in SI units: [`mod@material`].
 //! - Drafts of tops with their sleeves and hoods: [`mod@library::top`].
+//! - Cuts of all of them, ease and lengths: [`mod@library::cuts`].
 //! - Trousers, skirts, dress: [`mod@library::trousers`], [`mod@library::skirt`], [`mod@library::dress`].
 //! - Sizes: [`mod@size`].
 //! - GarmentCode: [`mod@import::garmentcode`].

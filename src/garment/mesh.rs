@@ -5,29 +5,26 @@ use super::{Anchor, GarmentError, GarmentKind, Material, Panel, Pattern, Placeme
 use serde::{Deserialize, Serialize};
 use tryon_geometry::math::P3;
 use tryon_geometry::mesh::{Face, Topology, TriMesh, UnionFind};
+use tryon_geometry::settings;
 
 /// Gap between panels in texture space, metres.
 const TEXTURE_GAP: f64 = 0.02;
 
-/// Settings of the triangulation.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Triangulation {
-    /// Target edge length, metres.
-    pub edge_length: f64,
-    /// Longest edges of a hood, metres: longer ones do not resolve the folds of a hood worn down.
-    pub hood_length: f64,
-    /// Smallest angle of a panel, degrees; a panel with a smaller one is refused.
-    pub min_angle: f64,
-}
-
-impl Default for Triangulation {
-    fn default() -> Self {
-        // 21 mm gives a T-shirt or a skirt about 2,000 vertices; the panels of the library stay above 20°.
-        Self {
-            edge_length: 0.021,
-            hood_length: 0.014,
-            min_angle: 12.0,
-        }
+settings! {
+    /// Settings of the triangulation. 21 mm gives a T-shirt or a skirt about 2,000 vertices; the panels of the library stay
+    /// above 20°.
+    pub struct Triangulation {
+        /// Target edge length, metres.
+        pub edge_length: f64 = 0.021,
+        /// Longest edges of a hood, metres: longer ones do not resolve the folds of a hood worn down.
+        pub hood_length: f64 = 0.014,
+        /// Smallest angle of a panel, degrees; a panel with a smaller one is refused.
+        pub min_angle: f64 = 12.0,
+        /// Least distance of lattice points from the outline, edge lengths: with 0.55 the triangles along the edge stay between a
+        /// slim and a flat one.
+        pub clearance: f64 = 0.58,
+        /// Iterations of Laplacian smoothing of inner points. Fewer leave slim triangles.
+        pub smoothing: usize = 4,
     }
 }
 
@@ -376,7 +373,11 @@ fn triangulate_all(pattern: &Pattern, how: &Triangulation) -> Result<Vec<PanelMe
         .iter()
         .zip(&pieces)
         .map(|(p, n)| {
-            let m = triangulate(p, n, length(p))?;
+            let of_panel = Triangulation {
+                edge_length: length(p),
+                ..*how
+            };
+            let m = triangulate(p, n, &of_panel)?;
             if m.min_angle < how.min_angle {
                 return Err(GarmentError::Panel {
                     panel: p.name.clone(),

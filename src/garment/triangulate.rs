@@ -1,7 +1,7 @@
 //! Triangulation of a flat panel: constrained Delaunay over boundary samples and a hexagonal lattice.
 
 use super::flat_triangle::{rest_area, smallest_angle};
-use super::{GarmentError, Panel};
+use super::{GarmentError, Panel, Triangulation};
 use spade::{ConstrainedDelaunayTriangulation, Point2, Triangulation as _};
 use tryon_geometry::mesh::Csr;
 use tryon_geometry::mesh::smoothing::mean;
@@ -16,22 +16,16 @@ pub(super) struct PanelMesh {
     pub(super) min_angle: f64,
 }
 
-/// Least distance of lattice points from the outline, in edge lengths: with 0.55 the triangles along the edge stay
-/// between a slim and a flat one.
-const CLEARANCE: f64 = 0.58;
 /// Height over length below which a triangle is a rounding sliver outside a straight edge.
 const FLAT: f64 = 1e-6;
-/// Iterations of Laplacian smoothing of inner points.
-const SMOOTHING: usize = 4;
-
-/// Triangulates a panel with `pieces` segments on each edge and edges of `length` metres inside.
+/// Triangulates a panel with `pieces` segments on each edge.
 ///
 /// # Errors
 /// Names the panel: coinciding points, or a point without a triangle.
 pub(super) fn triangulate(
     panel: &Panel,
     pieces: &[usize],
-    length: f64,
+    how: &Triangulation,
 ) -> Result<PanelMesh, GarmentError> {
     let fault = |why: String| GarmentError::Panel {
         panel: panel.name.clone(),
@@ -39,8 +33,8 @@ pub(super) fn triangulate(
     };
     let (outline, edges) = boundary(panel, pieces);
     let mut points = outline.clone();
-    points.extend(lattice(&outline, length));
-    for _ in 0..SMOOTHING {
+    points.extend(lattice(&outline, how));
+    for _ in 0..how.smoothing {
         let faces = delaunay(&points, &outline).map_err(fault)?;
         smooth(&mut points, &faces, outline.len());
     }
@@ -83,7 +77,8 @@ fn boundary(panel: &Panel, pieces: &[usize]) -> (Vec<[f64; 2]>, Vec<Vec<u32>>) {
 }
 
 /// Hexagonal lattice inside the outline, centred on x = 0 so that symmetric panels get symmetric triangles.
-fn lattice(outline: &[[f64; 2]], length: f64) -> Vec<[f64; 2]> {
+fn lattice(outline: &[[f64; 2]], how: &Triangulation) -> Vec<[f64; 2]> {
+    let length = how.edge_length;
     let side = |k: usize| {
         let coordinates = outline.iter().map(move |p| p[k]);
         let lo = coordinates.clone().fold(f64::MAX, f64::min);
@@ -100,7 +95,7 @@ fn lattice(outline: &[[f64; 2]], length: f64) -> Vec<[f64; 2]> {
                 (c as f64 + if r % 2 == 0 { 0.0 } else { 0.5 }) * length,
                 bottom + (r as f64 + 0.5) * step_y,
             ];
-            if inside(outline, p) && distance(outline, p) > CLEARANCE * length {
+            if inside(outline, p) && distance(outline, p) > how.clearance * length {
                 points.push(p);
             }
         }

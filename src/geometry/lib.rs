@@ -9,6 +9,7 @@
 //! - Typed frames: [`mod@math::frames`].
 //! - Nearest rotation: [`mod@math::polar`].
 //! - Medians, percentiles, quantiles: [`mod@math::order_statistics`].
+//! - Settings structs, defaults beside their documentation: [`settings!`].
 //! - Finite-difference check of energies and residuals: [`mod@math::derivative_check`].
 //! - Deterministic parallel loops: [`mod@par`].
 //! - Spin barrier: [`mod@par::lockstep`].
@@ -45,4 +46,5 @@ pub mod mesh;
 pub mod mrf;
 pub mod par;
 pub mod raster;
+mod settings;
 pub mod spatial;

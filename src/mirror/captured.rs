@@ -10,7 +10,7 @@ use tryon_clothcap::retarget::on_body;
 use tryon_clothcap::segment::Slot;
 use tryon_clothcap::texture::{GarmentTexture, Texel, TextureAtlas};
 use tryon_clothcap::topology::ClothTemplate;
-use tryon_dressing::{MeshGarment, MeshGarmentError, SourceBody};
+use tryon_dressing::{MeshGarment, MeshGarmentError, MeshGarmentSettings, SourceBody};
 use tryon_formats::FormatError;
 use tryon_garment::{FabricImage, Material, RenderMesh};
 use tryon_geometry::math::order_statistics::medians;
@@ -99,7 +99,8 @@ impl CapturedWardrobe {
         let mesh = part.trimmed(&vertices).ok_or_else(|| {
             MeshGarmentError::Nothing(format!("{name}: nothing is left of its narrow strips"))
         })?;
-        let made = MeshGarment::on_body(name, mesh, self.body.clone(), material, edge)?;
+        let settings = MeshGarmentSettings::with_edge(edge);
+        let made = MeshGarment::on_body(name, mesh, self.body.clone(), material, &settings)?;
         let mut garment = made.in_layer(layer(part.slot));
         garment.color = color(part, &outfit.colors[k]);
         let texture = outfit.atlases.get(k).zip(self.textures.get(k));

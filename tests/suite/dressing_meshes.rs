@@ -5,7 +5,8 @@ use std::path::{Path, PathBuf};
 use tryon::body::{BodyShape, Pose, RestBody, Template, embedded};
 use tryon::cloth::{Config, Input, Workspace, step};
 use tryon::dressing::{
-    DressError, DressOptions, Dressed, GarmentSource, MeshGarment, SourceBody, dress, dress_all,
+    DressError, DressOptions, Dressed, GarmentSource, MeshGarment, MeshGarmentSettings, SourceBody,
+    dress, dress_all,
 };
 use tryon::formats::gltf::{GlbMesh, write_glb};
 use tryon::formats::shared_data;
@@ -49,7 +50,7 @@ fn read(file: &Path, body: Option<SourceBody>) -> MeshGarment {
         file,
         body,
         &Material::preset("cotton").expect("preset"),
-        0.021,
+        &MeshGarmentSettings::default(),
     )
     .expect("wearable");
     println!("{}: {}", w.name, w.notes.join("; "));
@@ -254,7 +255,7 @@ fn our_own_gltf_is_retargeted_from_any_place_in_a_room() {
             &file,
             None,
             &Material::preset("cotton").expect("preset"),
-            0.021,
+            &MeshGarmentSettings::default(),
         )
     };
     let before = extent_and_area(&first, 0).0;

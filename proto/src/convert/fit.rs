@@ -1,7 +1,7 @@
 //! Fit maps on the wire.
 
 use crate::v1::{FitClass, GarmentFit, RegionFit};
-use tryon::dressing::{self, FitMap, Suggestion};
+use tryon::dressing::{self, FitMap, FitMapSettings, Suggestion};
 
 /// Byte of a tightness.
 const TIGHTEST: f32 = 127.0;
@@ -35,10 +35,11 @@ pub fn fit_to_wire(
         ease: ease(&r.name).map(|r| r.ease() as f32),
         ease_needed: ease(&r.name).map(|r| r.least_ease as f32),
     });
+    let limits = FitMapSettings::default();
     let tightness = map
         .vertices
         .iter()
-        .map(|v| (v.tightness() * TIGHTEST).round() as i8 as u8)
+        .map(|v| (v.tightness(&limits) * TIGHTEST).round() as i8 as u8)
         .collect();
     GarmentFit {
         provisional: false,

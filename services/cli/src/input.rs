@@ -7,7 +7,7 @@ use std::path::Path;
 use std::sync::Arc;
 use std::time::Duration;
 use tryon::body::{Template, embedded, import::template_from_smpl};
-use tryon::dressing::{MeshGarment, SourceBody};
+use tryon::dressing::{MeshGarment, MeshGarmentSettings, SourceBody};
 use tryon::formats::garmentcode::{is_garmentcode, parse_garmentcode};
 use tryon::formats::npz::read_smpl;
 use tryon::garment::import::from_garmentcode;
@@ -130,8 +130,8 @@ fn is_mesh(path: &Path) -> bool {
 
 /// Mesh garment of cotton, made on `body`, which is guessed when absent.
 fn mesh_garment(path: &Path, body: Option<SourceBody>) -> Result<MeshGarment> {
-    let edge = Triangulation::default().edge_length;
-    MeshGarment::read_on(path, body, &Material::preset("cotton")?, edge)
+    let settings = MeshGarmentSettings::with_edge(Triangulation::default().edge_length);
+    MeshGarment::read_on(path, body, &Material::preset("cotton")?, &settings)
         .with_context(|| path.display().to_string())
 }
 

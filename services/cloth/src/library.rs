@@ -6,7 +6,7 @@ use std::path::Path;
 use std::sync::Arc;
 use tryon::body::embedded;
 use tryon::clothcap::segment::Slot;
-use tryon::dressing::{MeshGarment, SourceBody};
+use tryon::dressing::{MeshGarment, MeshGarmentSettings, SourceBody};
 use tryon::garment::{GarmentKind, Material, Size, Triangulation, library};
 use tryon::mirror::{CapturedWardrobe, Choice};
 use tryon_kit::config::ClothConfig;
@@ -148,8 +148,8 @@ impl Library {
         material: &Material,
     ) -> Result<String, String> {
         self.check_name(name)?;
-        let edge = Triangulation::default().edge_length;
-        let garment = MeshGarment::read_on(file, body, material, edge)
+        let settings = MeshGarmentSettings::with_edge(Triangulation::default().edge_length);
+        let garment = MeshGarment::read_on(file, body, material, &settings)
             .map_err(|e| e.to_string())?
             .named(name);
         let category = if garment.layer() > 0 { "top" } else { "bottom" };

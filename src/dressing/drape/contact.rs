@@ -3,33 +3,12 @@
 use super::context::{DrapeContext, OuterGarment};
 use super::state::Drape;
 use crate::plane::DrapePlane;
+use crate::settings::DrapeContactSettings;
 use crate::skin::Skin;
 use tryon_cloth::contact::{ClosestPoint, Part};
 use tryon_garment::Region;
 use tryon_geometry::math::{P3, V3d};
 use tryon_geometry::par::Par;
-
-/// Distance beyond which a plane is ignored (m).
-const REACH: f64 = 0.10;
-/// Radius around its point within which a plane approximates the surface (m).
-const PLANE_SIZE: f64 = 0.10;
-/// Distance outside an outer garment beyond which a vertex is not under it (m): a bell of a skirt stands out less, the other
-/// side of the body is farther.
-const OUTER_REACH: f32 = 0.15;
-/// Distance below a hem up to which an inner garment may stand out as far (m): an edge of the coarse mesh, whose triangles
-/// cross the hem.
-const HEM: f32 = 0.05;
-/// Distance kept under an outer garment (m): a little more than the 2.5 mm between two layers on the skin.
-const UNDER: f64 = 0.003;
-/// Coulomb coefficient against sliding up the trunk. Sliding down and around is free, as the subject pulls cloth there. With
-/// none, tight hems roll up to the neck.
-const HELD_DOWN: f64 = 0.5;
-/// Largest motion of one projection out of the body (m): deeper vertices come out over several substeps.
-const LIFT: f64 = 0.01;
-/// Depth in other skin beyond which skin supports no cloth (m).
-const CLOSED: f64 = 0.03;
-/// Depth that is left at the end (m): a millimetre more than tangled cloth may sink.
-const DEEP: f64 = 0.003;
 
 impl Drape {
     /// Finds the nearest body vertices among all.
@@ -97,7 +76,7 @@ impl Drape {
         found: &[ClosestPoint; 2],
         context: &DrapeContext<'_>,
     ) -> [DrapePlane; 2] {
-        let (skin, offset) = (context.skin, context.offset);
+        let (skin, offset, settings) = (context.skin, context.offset, &self.settings.contact);
         let facing = found[0]
             .clearance_to(&found[1])
             .filter(|_| !found[1].on_part_boundary)
@@ -111,23 +90,24 @@ impl Drape {
             near: room >= 0.0
                 && !c.on_part_boundary
                 && !skin.is_interior(c)
-                && f64::from(c.signed_distance) < REACH,
+                && f64::from(c.signed_distance) < settings.reach,
         };
         let [mut own, mut other] = [plane(&found[0]), plane(&found[1])];
         let untangles = self.untangler.is_some();
-        if self.fine && untangles && (-CLOSED..0.0).contains(&room) && !found[0].on_part_boundary {
+        let closed = -settings.closed..0.0;
+        if self.fine && untangles && closed.contains(&room) && !found[0].on_part_boundary {
             // At most half-way into skin that lies in other skin; coarse cloth must pass through it on its way out.
             let held = !skin.is_interior(&found[0]);
-            (own.near, own.height) = (held && distance[0] < REACH, 0.5 * room);
+            (own.near, own.height) = (held && distance[0] < settings.reach, 0.5 * room);
         }
         let halved = untangles && facing.is_some() && own.near && other.near;
-        let kept = halved && own.keep_half(&mut other, &self.x[i], distance, room);
+        let kept = halved && own.keep_half(&mut other, &self.x[i], distance, room, settings);
         other.near &= kept || room >= 2.0 * offset;
         [own, other]
     }
     /// Appends the planes of an outer garment.
     fn find_outer_planes(&mut self, k: usize, outer: &OuterGarment) {
-        let (model, frame) = (&outer.model, &outer.frame);
+        let (model, frame, settings) = (&outer.model, &outer.frame, self.settings.contact);
         if self.nearest_outer.len() <= k {
             let nearest = |(x, own): (&V3d, &Part)| {
                 model.nearest_vertex(frame, &P3::from(x.cast::<f32>()), *own)
@@ -139,15 +119,16 @@ impl Drape {
             let p = P3::from(self.x[i].cast::<f32>());
             let c = model.closest(frame, &p, *near, self.own[i]);
             *near = c.vertex;
-            let Some(c) = model.cover(frame, &p, &c, HEM) else {
+            let Some(c) = model.cover(frame, &p, &c, settings.hem) else {
                 continue;
             };
-            let reached = c.signed_distance < OUTER_REACH && -f64::from(c.signed_distance) < REACH;
+            let reached = c.signed_distance < settings.outer_reach
+                && -f64::from(c.signed_distance) < settings.reach;
             if reached && self.pinned[i].is_none() {
                 let plane = DrapePlane {
                     point: c.point.coords.cast(),
                     normal: -c.normal.cast::<f64>(),
-                    height: UNDER,
+                    height: settings.under,
                     near: true,
                 };
                 self.outer_planes.push((i as u32, plane));
@@ -166,12 +147,15 @@ impl Drape {
             let pushed = self.project_out(i, &other, sunk) + self.project_out(i, &own, sunk);
             let up = self.x[i].y - self.before[i].y;
             if pushed > 0.0 && up > 0.0 && self.held_down[i] && self.pinned[i].is_none() {
-                self.x[i].y -= up.min(HELD_DOWN * pushed);
+                self.x[i].y -= up.min(self.settings.contact.held_down * pushed);
             }
         }
     }
     /// Moves a vertex above a plane; returns the distance (m).
     fn project_out(&mut self, i: usize, p: &DrapePlane, sunk: f64) -> f64 {
+        let DrapeContactSettings {
+            plane_size, lift, ..
+        } = self.settings.contact;
         let d = self.x[i] - p.point;
         let slack = self.slack[i];
         let allowed = if slack > 0.0 {
@@ -180,8 +164,8 @@ impl Drape {
             0.0
         };
         let gap = p.normal.dot(&d) - (p.height - allowed);
-        if p.near && gap < 0.0 && d.norm_squared() < PLANE_SIZE * PLANE_SIZE {
-            let push = (-gap).min(LIFT);
+        if p.near && gap < 0.0 && d.norm_squared() < plane_size * plane_size {
+            let push = (-gap).min(lift);
             self.x[i] += p.normal * push;
             return push;
         }
@@ -191,7 +175,7 @@ impl Drape {
     pub(crate) fn lift_deep(&mut self, skin: &Skin<'_>) {
         for i in 0..self.x.len() {
             let c = skin.closest(&self.point(i), self.nearest[i][0], self.own[i]);
-            let deep = f64::from(c.signed_distance) < -DEEP
+            let deep = f64::from(c.signed_distance) < -self.settings.contact.deep
                 && !c.on_part_boundary
                 && !skin.is_interior(&c);
             if deep && self.pinned[i].is_none() {
@@ -228,7 +212,10 @@ mod tests {
         assert!((drape.x[0].y - 0.002).abs() < 1e-12);
         assert_eq!(drape.project_out(0, &plane, 0.0), 0.0, "already there");
         let (mut drape, plane) = above(-0.05, 0.0);
-        assert_eq!(drape.project_out(0, &plane, 0.0), LIFT);
+        assert_eq!(
+            drape.project_out(0, &plane, 0.0),
+            drape.settings.contact.lift
+        );
     }
 
     #[test]
@@ -248,7 +235,7 @@ mod tests {
             ..plane
         };
         assert_eq!(drape.project_out(0, &ignored, 0.0), 0.0);
-        drape.x[0].x = PLANE_SIZE;
+        drape.x[0].x = drape.settings.contact.plane_size;
         assert_eq!(drape.project_out(0, &plane, 0.0), 0.0);
     }
 }

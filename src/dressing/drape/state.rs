@@ -2,6 +2,7 @@
 
 use crate::hood::Hood;
 use crate::plane::DrapePlane;
+use crate::settings::{DrapeSettings, HeldDownSettings};
 use crate::skin::Skin;
 use std::collections::BTreeSet;
 use tryon_cloth::contact::Part;
@@ -15,11 +16,6 @@ use tryon_geometry::mesh::distances;
 
 /// Share of the membrane stiffness that an edge of a hexagonal spring lattice carries: √3/2.
 const LATTICE: f64 = 0.866;
-/// Distance from sleeves within which skin does not hold cloth down [m of cloth]. Smaller stretches a lowered arm's sleeve
-/// (p99 0.34 instead of 0.05 on a T-shirt that fits).
-const SLEEVE: f64 = 0.15;
-/// The same distance from the shoulders [m of cloth]: armholes without a sleeve are within 24 cm.
-const TOP: f64 = 0.34;
 /// Parts that cloth around the trunk touches.
 const AROUND: Region = Region::TRUNK.with(Region::LEFT_LEG).with(Region::RIGHT_LEG);
 
@@ -36,6 +32,7 @@ pub(super) struct EdgeConstraint {
 /// One garment being draped.
 #[derive(Debug, Default)]
 pub(crate) struct Drape {
+    pub(super) settings: DrapeSettings,
     /// Positions in the world (m).
     pub(crate) x: Vec<V3d>,
     pub(super) velocity: Vec<V3d>,
@@ -79,11 +76,17 @@ pub(super) fn on_arms(own: Part) -> bool {
 }
 
 impl Drape {
-    pub(crate) fn new(mesh: &GarmentMesh, sheet: &Sheet, x: Vec<P3>) -> Self {
+    pub(crate) fn new(
+        mesh: &GarmentMesh,
+        sheet: &Sheet,
+        x: Vec<P3>,
+        settings: &DrapeSettings,
+    ) -> Self {
         let n = x.len();
         let own: Vec<Part> = mesh.regions.iter().map(|r| r.decisive().0).collect();
         Self {
-            held_down: held_down(mesh, sheet, &own),
+            settings: *settings,
+            held_down: held_down(mesh, sheet, &own, &settings.held_down),
             velocity: vec![V3d::zeros(); n],
             inverse_mass: sheet.mass.iter().map(|m| 1.0 / m).collect(),
             edges: edges_from_top(mesh, sheet, &x),
@@ -105,7 +108,7 @@ impl Drape {
         sheet: &Sheet,
     ) -> Result<Self, GarmentError> {
         self.untangler = Some(Untangler::new(&mesh.faces, &self.x));
-        self.hood = Hood::new(mesh, sheet)?;
+        self.hood = Hood::new(mesh, sheet, self.settings.hood)?;
         Ok(self)
     }
     /// Positions in single precision (m).
@@ -169,15 +172,21 @@ fn edges_from_top(mesh: &GarmentMesh, sheet: &Sheet, x: &[P3]) -> Vec<EdgeConstr
     order.into_iter().map(edge).collect()
 }
 
-fn held_down(mesh: &GarmentMesh, sheet: &Sheet, own: &[Part]) -> Vec<bool> {
+fn held_down(
+    mesh: &GarmentMesh,
+    sheet: &Sheet,
+    own: &[Part],
+    settings: &HeldDownSettings,
+) -> Vec<bool> {
+    let &HeldDownSettings { sleeve, top } = settings;
     let n = own.len();
-    let from_sleeve = distances(n, &sheet.edges, SLEEVE, |i| {
+    let from_sleeve = distances(n, &sheet.edges, sleeve, |i| {
         mesh.regions[i].meets(Region::ARMS)
     });
     let soft = mesh.anchors.iter().filter(|a| a.strength < 1.0);
     let tops: BTreeSet<u32> = soft.flat_map(|a| &a.vertices).copied().collect();
-    let from_top = distances(n, &sheet.edges, TOP, |i| tops.contains(&(i as u32)));
+    let from_top = distances(n, &sheet.edges, top, |i| tops.contains(&(i as u32)));
     (0..n)
-        .map(|i| own[i] == AROUND.0 && from_sleeve[i] > SLEEVE && from_top[i] > TOP)
+        .map(|i| own[i] == AROUND.0 && from_sleeve[i] > sleeve && from_top[i] > top)
         .collect()
 }

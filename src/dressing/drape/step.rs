@@ -2,47 +2,42 @@
 
 use super::context::DrapeContext;
 use super::state::Drape;
+use crate::settings::DrapeSettings;
 use tryon_cloth::solver::xpbd::{project_distance, project_hinge};
 use tryon_geometry::math::V3d;
 
 /// m/s².
 const GRAVITY: f64 = 9.81;
-/// Rate of velocity damping (1/s): a skirt swings out in a quarter of a second.
-const DAMPING: f64 = 5.0;
-/// Largest speed of cloth that is put on (m/s).
-const MAX_SPEED: f64 = 2.0;
-/// Largest speed of a fine sheet that was smoothed locally (m/s). Compressed cloth springs back at 2 m/s, and through itself.
-const MAX_COMPRESSED_SPEED: f64 = 0.3;
-/// Substeps between two contact queries: cloth at 1 m/s moves 1.6 cm at 2 ms.
-pub(super) const QUERY_INTERVAL: usize = 8;
-/// Substeps between two queries of a hood against itself.
-const HOOD_INTERVAL: usize = 4;
-/// Substeps between two untangling iterations of a sheet that intersects.
-const UNTANGLE_INTERVAL: usize = 2;
-/// Passes over the edges in a substep. With one, trousers of 40 rows hang a tenth too long.
-const SWEEPS: usize = 4;
 
 impl Drape {
     /// Runs `steps` substeps of `h` seconds on a body and under garments that stand still. `weight` scales gravity: first
     /// gaps between panels close, then cloth falls.
     pub(crate) fn run(&mut self, context: &DrapeContext<'_>, steps: usize, h: f64, weight: f64) {
+        let DrapeSettings {
+            query_interval,
+            hood_interval,
+            untangle_interval,
+            sweeps,
+            max_compressed_speed,
+            ..
+        } = self.settings;
         self.steps += steps;
         for s in 0..steps {
-            let queries = s % QUERY_INTERVAL == 0;
+            let queries = s % query_interval == 0;
             if queries {
                 self.find_planes(context);
             }
             self.predict(h, weight);
-            for sweep in 0..SWEEPS {
+            for sweep in 0..sweeps {
                 self.project_edges(h, (s + sweep) % 2 == 1);
             }
             self.project_hinges(h);
-            self.resolve_hood(s % HOOD_INTERVAL == 0, h);
+            self.resolve_hood(s % hood_interval == 0, h);
             if self.fine && self.compressed {
-                self.limit_displacement(MAX_COMPRESSED_SPEED * h);
+                self.limit_displacement(max_compressed_speed * h);
             }
             self.project_contacts(0.0);
-            let follows = self.crossings > 0 && s % UNTANGLE_INTERVAL == 0;
+            let follows = self.crossings > 0 && s % untangle_interval == 0;
             if (weight >= 1.0 || self.hood.is_some()) && (queries || follows) {
                 self.untangle(queries);
             }
@@ -51,7 +46,7 @@ impl Drape {
     }
     /// Positions under inertia and gravity; pinned vertices go to their targets.
     fn predict(&mut self, h: f64, weight: f64) {
-        let keep = (-DAMPING * h).exp();
+        let keep = (-self.settings.damping * h).exp();
         let fall = V3d::new(0.0, -GRAVITY * weight * h * h, 0.0);
         self.before.clone_from(&self.x);
         for i in 0..self.x.len() {
@@ -61,16 +56,13 @@ impl Drape {
             }
         }
     }
-    /// Velocities of the substep, limited to [`MAX_SPEED`].
+    /// Velocities of the substep, limited to the largest speed.
     fn update_velocities(&mut self, h: f64) {
+        let most = self.settings.max_speed;
         for i in 0..self.x.len() {
             let v = (self.x[i] - self.before[i]) / h;
             let speed = v.norm();
-            self.velocity[i] = if speed > MAX_SPEED {
-                v * (MAX_SPEED / speed)
-            } else {
-                v
-            };
+            self.velocity[i] = if speed > most { v * (most / speed) } else { v };
         }
     }
     /// Projects edges to their lengths; alternating directions favour no side.
@@ -157,7 +149,7 @@ mod tests {
             drape.update_velocities(H);
         }
         // vₖ = g h (1 + q + … + qᵏ⁻¹) with q = exp(−damping h).
-        let q = (-DAMPING * H).exp();
+        let q = (-drape.settings.damping * H).exp();
         let speed = |k: i32| GRAVITY * H * (1.0 - q.powi(k)) / (1.0 - q);
         let fall: f64 = (1..=STEPS).map(|k| H * speed(k)).sum();
         for (x, start) in drape.x.iter().zip(&start) {
@@ -171,7 +163,7 @@ mod tests {
         let mut drape = chain(2, true);
         for s in 0..2000 {
             drape.predict(H, 1.0);
-            for sweep in 0..SWEEPS {
+            for sweep in 0..drape.settings.sweeps {
                 drape.project_edges(H, (s + sweep) % 2 == 1);
             }
             drape.update_velocities(H);
@@ -187,7 +179,7 @@ mod tests {
         let mut drape = chain(1, false);
         drape.before = vec![V3d::new(1.0, 0.0, 0.0)];
         drape.update_velocities(1e-3);
-        assert!((drape.velocity[0].norm() - MAX_SPEED).abs() < 1e-12);
+        assert!((drape.velocity[0].norm() - drape.settings.max_speed).abs() < 1e-12);
         drape.limit_displacement(0.25);
         assert_eq!(drape.x[0], V3d::new(0.75, 0.0, 0.0));
     }

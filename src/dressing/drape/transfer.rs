@@ -1,15 +1,11 @@
 //! Motion of a garment with the body between two poses.
 
 use super::state::{Drape, on_arms};
+use crate::settings::FollowSettings;
 use crate::skin::Skin;
 use tryon_cloth::AnchorBinding;
 use tryon_cloth::contact::SurfaceFrame;
 use tryon_geometry::math::{P3, V3, V3d};
-
-/// Distance from the skin up to which cloth follows it (m); the share fades to zero at twice that.
-const FOLLOWING: f64 = 0.04;
-/// The same for sleeves. Smaller, and an arm that bends leaves a wide sleeve.
-const FOLLOWING_SLEEVE: f64 = 0.07;
 
 impl Drape {
     /// Pins the rigid anchors to the body of `frame`.
@@ -27,14 +23,14 @@ impl Drape {
     }
     /// Moves cloth near the skin with a body that goes from `from` to `to` (m).
     pub(crate) fn follow_skin(&mut self, from: &[P3], to: &[P3]) {
+        let FollowSettings {
+            within,
+            sleeve_within,
+        } = self.settings.follow;
         for ((x, near), own) in self.x.iter_mut().zip(&self.nearest).zip(&self.own) {
             let v = near[0] as usize;
             let d = (from[v].coords.cast::<f64>() - *x).norm();
-            let within = if on_arms(*own) {
-                FOLLOWING_SLEEVE
-            } else {
-                FOLLOWING
-            };
+            let within = if on_arms(*own) { sleeve_within } else { within };
             let share = (2.0 - d / within).clamp(0.0, 1.0);
             *x += (to[v] - from[v]).cast::<f64>() * share;
         }

@@ -1,6 +1,7 @@
 //! Classification of a piece of a mesh garment by the skin it lies over.
 
 use crate::file_frame::bounds;
+use crate::settings::ClassifierSettings;
 use tryon_body::parts::vertex_masks;
 use tryon_body::{SkinBinding, Template};
 use tryon_formats::sewn_obj::SewnObj;
@@ -9,18 +10,6 @@ use tryon_geometry::math::P3;
 use tryon_geometry::mesh::Topology;
 use tryon_geometry::spatial::PointTree;
 
-/// A piece smaller than this in every direction is a button or a buckle, metres.
-const SMALLEST: f32 = 0.08;
-/// Share of vertices over head, hands or feet from which a piece is an accessory.
-const ACCESSORY: f64 = 0.85;
-/// An opening smaller than this across is a slit, metres.
-const OPENING: f32 = 0.06;
-/// Tenths of an opening that lie over one leg where the opening is a trouser hem.
-const HEM_TENTHS: usize = 9;
-/// Cloth that reaches this close to the shoulders' height, metres, is held by them.
-const NEAR_SHOULDER: f32 = 0.02;
-/// Share of vertices over legs from which a garment is a dress (from the shoulders) or a skirt (from an opening).
-const OVER_LEGS: [f64; 2] = [0.25, 0.15];
 /// Height of the shoulders of a skeleton without joints there, metres.
 const DEFAULT_SHOULDER: f32 = 1.4;
 /// Distance within which skin is searched, metres.
@@ -53,6 +42,7 @@ pub(super) struct PieceShape {
 /// The body that pieces are classified on.
 pub(super) struct PieceClassifier<'a> {
     pub(super) template: &'a Template,
+    settings: &'a ClassifierSettings,
     parts: Vec<u8>,
     tree: PointTree,
     /// Per body vertex: it belongs to the head, a hand or a foot.
@@ -63,7 +53,7 @@ pub(super) struct PieceClassifier<'a> {
 }
 
 impl<'a> PieceClassifier<'a> {
-    pub(super) fn new(template: &'a Template) -> Self {
+    pub(super) fn new(template: &'a Template, settings: &'a ClassifierSettings) -> Self {
         let sk = template.skeleton();
         let segment = |i: usize| template.parts().segment(template.weights().dominant(i));
         let body = template.mesh().vertices();
@@ -77,6 +67,7 @@ impl<'a> PieceClassifier<'a> {
                 .unwrap_or(DEFAULT_SHOULDER),
             knee: height("left_knee").unwrap_or(f32::MIN),
             template,
+            settings,
         }
     }
     /// Cloth, in contrast to an accessory that keeps its shape: hats, shoes, buttons. Socks count as shoes.
@@ -90,9 +81,9 @@ impl<'a> PieceClassifier<'a> {
             .iter()
             .filter(|p| nearest(p).is_some_and(|(i, _)| self.is_end[i]))
             .count();
-        (hi - lo).amax() > SMALLEST
+        (hi - lo).amax() > self.settings.smallest
             && hi.y > self.knee
-            && (over_ends as f64) < ACCESSORY * v.len() as f64
+            && (over_ends as f64) < self.settings.accessory * v.len() as f64
     }
     /// Classifies a piece of cloth with vertices `x` (m) bound to the body.
     pub(super) fn classify(
@@ -101,6 +92,7 @@ impl<'a> PieceClassifier<'a> {
         x: &[P3],
         binding: &SkinBinding,
     ) -> PieceShape {
+        let settings = self.settings;
         let below = |i: usize| binding.vertices[i].first().map_or(0, |v| v.0 as usize);
         let parts: Vec<u8> = (0..x.len()).map(|i| self.parts[below(i)]).collect();
         let diameter = |l: &[u32]| {
@@ -110,16 +102,16 @@ impl<'a> PieceClassifier<'a> {
         let openings: Vec<Vec<u32>> = topology
             .boundary_components()
             .into_iter()
-            .filter(|l| diameter(l) > OPENING)
+            .filter(|l| diameter(l) > settings.opening)
             .collect();
         let over = |leg: Region, l: &[u32]| {
             let over = l.iter().filter(|v| parts[**v as usize] & leg.0 != 0);
-            over.count() * 10 > l.len() * HEM_TENTHS
+            over.count() * 10 > l.len() * settings.hem_tenths
         };
         let has_hem = |leg: Region| openings.iter().any(|l| over(leg, l));
         let has_legs = has_hem(Region::LEFT_LEG) && has_hem(Region::RIGHT_LEG);
         let top = x.iter().map(|p| p.y).fold(f32::MIN, f32::max);
-        let support = if top > self.shoulder - NEAR_SHOULDER {
+        let support = if top > self.shoulder - settings.near_shoulder {
             Support::Shoulders
         } else {
             Support::Opening
@@ -127,9 +119,9 @@ impl<'a> PieceClassifier<'a> {
         let over_legs =
             parts.iter().filter(|p| **p & LEGS.0 != 0).count() as f64 / parts.len().max(1) as f64;
         let kind = match support {
-            Support::Shoulders if over_legs > OVER_LEGS[0] => GarmentKind::Dress,
+            Support::Shoulders if over_legs > settings.over_legs[0] => GarmentKind::Dress,
             Support::Opening if has_legs => GarmentKind::Trousers,
-            Support::Opening if over_legs > OVER_LEGS[1] => GarmentKind::Skirt,
+            Support::Opening if over_legs > settings.over_legs[1] => GarmentKind::Skirt,
             _ => GarmentKind::Top,
         };
         PieceShape {

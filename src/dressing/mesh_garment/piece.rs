@@ -6,6 +6,7 @@ use super::grading::{Grading, LimbShares};
 use super::skin_lift::lifted;
 use super::surface::{follow_both_legs, orient_outwards, unroll};
 use crate::retarget::Retargeting;
+use crate::settings::{MeshGarmentSettings, PieceSettings};
 use tryon_body::{SkinBinding, SkinSearch};
 use tryon_formats::obj::ObjMesh;
 use tryon_formats::sewn_obj::SewnObj;
@@ -19,16 +20,8 @@ use tryon_garment::{
 use tryon_geometry::math::P3;
 use tryon_geometry::mesh::{Face, Topology, TriMesh, face_normal, remesh};
 
-/// Share of the wanted edge length below which panels are coarsened: finer ones cannot be simulated in time.
-const FINER: f64 = 0.7;
 /// Smallest triangle of an accessory, m².
 const LEAST_AREA: f64 = 2e-8;
-/// Least height of a triangle of cloth over its longest side: remeshing leaves a sliver now and then.
-const LEAST_HEIGHT: f64 = 0.02;
-/// Cloth this near to the sagittal plane may touch both legs, metres.
-const MIDDLE: f32 = 0.02;
-/// Share of its area below which a retargeted triangle has collapsed and keeps its rest shape.
-const COLLAPSED: f64 = 0.2;
 
 /// A piece on the body that it was made on.
 #[derive(Clone, Debug)]
@@ -56,14 +49,13 @@ pub(super) struct PieceBuilder<'a> {
     pub(super) classifier: &'a PieceClassifier<'a>,
     pub(super) name: &'a str,
     pub(super) material: &'a Material,
-    /// Wanted edge length, metres.
-    pub(super) edge: f64,
+    pub(super) settings: &'a MeshGarmentSettings,
 }
 
 impl PieceBuilder<'_> {
     /// A sheet of cloth, and a note about it.
     pub(super) fn cloth(&self, sewn: SewnObj) -> Result<(GarmentPiece, String), GarmentError> {
-        let sewn = self.remeshed(sewn);
+        let (sewn, settings) = (self.remeshed(sewn), self.settings);
         let made = from_mesh(&sewn, self.name, GarmentKind::Top, self.material.clone())?;
         let (mut garment, mut x) = (made.garment, made.positions);
         let mut more = String::new();
@@ -73,9 +65,9 @@ impl PieceBuilder<'_> {
                 made.open, made.closed
             );
         }
-        if made.flat && median_edge(&garment) < FINER * self.edge {
+        if made.flat && median_edge(&garment) < settings.piece.finer * settings.edge {
             more += &format!(", {} in the file", garment.vertices);
-            (garment, x) = coarsen(&garment, &x, self.edge);
+            (garment, x) = coarsen(&garment, &x, settings.edge, &settings.coarsen);
         }
         let topology = garment.topology()?;
         let template = self.classifier.template;
@@ -83,18 +75,18 @@ impl PieceBuilder<'_> {
         let mut binding = SkinBinding::new(template, &x, neighbours);
         orient_outwards(&mut garment, &x, &binding);
         if !made.flat {
-            unroll(&mut garment, &x);
+            unroll(&mut garment, &x, settings.surface.unroll_radius);
             for rest in &mut garment.rest {
-                *rest = widened(*rest, LEAST_HEIGHT);
+                *rest = widened(*rest, settings.piece.least_height);
             }
         }
         let shape = self.classifier.classify(&topology, &x, &binding);
         if !shape.has_legs {
-            follow_both_legs(template, &x, &mut binding);
+            follow_both_legs(template, &x, &mut binding, &settings.surface);
         }
         garment.kind = shape.kind;
-        garment.regions = regions(&shape, &topology, &x);
-        garment.anchors = anchors(template, &shape, &x);
+        garment.regions = regions(&shape, &topology, &x, settings.piece.middle);
+        garment.anchors = anchors(template, &shape, &x, &settings.anchors);
         let note = format!(
             "{}, {} vertices, {}{more}",
             kind_name(shape.kind),
@@ -155,7 +147,7 @@ impl PieceBuilder<'_> {
         }
         SewnObj {
             obj: ObjMesh {
-                mesh: remesh(&sewn.obj.mesh, self.edge),
+                mesh: remesh(&sewn.obj.mesh, self.settings.edge),
                 uv: Vec::new(),
                 face_uv: Vec::new(),
             },
@@ -173,15 +165,16 @@ fn kind_name(kind: GarmentKind) -> &'static str {
     }
 }
 
-/// Body parts that each vertex may touch: its own, and at the border of sleeve and trunk both.
-fn regions(shape: &PieceShape, topology: &Topology, x: &[P3]) -> Vec<Region> {
+/// Body parts that each vertex may touch: its own, at the border of sleeve and trunk both, and both legs within `middle`
+/// metres of the sagittal plane.
+fn regions(shape: &PieceShape, topology: &Topology, x: &[P3], middle: f32) -> Vec<Region> {
     let own = |i: usize| -> Region {
         let p = Region(shape.parts[i]);
         if p.meets(Region::ARMS) {
             return p;
         }
         let over_trunk = p.meets(Region::TRUNK) && shape.support == Support::Shoulders;
-        Region::TRUNK.with(if !shape.has_legs || over_trunk || x[i].x.abs() < MIDDLE {
+        Region::TRUNK.with(if !shape.has_legs || over_trunk || x[i].x.abs() < middle {
             LEGS
         } else if x[i].x > 0.0 {
             Region::LEFT_LEG
@@ -226,18 +219,23 @@ impl GarmentPiece {
         &self,
         map: &Retargeting,
         skin: &SkinSearch<'_>,
+        settings: &MeshGarmentSettings,
     ) -> (GarmentMesh, Vec<P3>) {
         let (binding, rigid) = (&self.binding, self.is_rigid());
         let x: Vec<P3> = (0..self.positions.len())
             .map(|i| {
                 let p = map.point(&self.positions[i], &binding.joints[i], &binding.vertices[i]);
-                if rigid { p } else { lifted(skin, p) }
+                if rigid {
+                    p
+                } else {
+                    lifted(skin, p, &settings.lift)
+                }
             })
             .collect();
         let mut garment = self.garment.clone();
         match self.rest {
             RestShape::Scaled => self.scale_rest(&x, &mut garment),
-            RestShape::Fitted => take_rest(&x, &mut garment),
+            RestShape::Fitted => take_rest(&x, &mut garment, settings.piece.collapsed),
             RestShape::Sized => {}
         }
         (garment, x)
@@ -256,14 +254,20 @@ impl GarmentPiece {
         }
     }
     /// The piece in a size, its rest shape fixed: that over the source body at `x` (m, off its skin), graded.
-    pub(super) fn in_size(&self, size: Size, grading: &Grading<'_>, x: &[P3]) -> Self {
+    pub(super) fn in_size(
+        &self,
+        size: Size,
+        grading: &Grading<'_>,
+        x: &[P3],
+        settings: &PieceSettings,
+    ) -> Self {
         let mut out = self.clone();
         out.garment.size = size;
         if self.is_rigid() {
             return out;
         }
         if self.rest == RestShape::Fitted {
-            take_rest(x, &mut out.garment);
+            take_rest(x, &mut out.garment, settings.collapsed);
         }
         let shares: Vec<LimbShares> = self
             .binding
@@ -282,10 +286,10 @@ impl GarmentPiece {
 }
 
 /// Takes the rest shape of all triangles that have not collapsed from positions `x`, metres.
-fn take_rest(x: &[P3], garment: &mut GarmentMesh) {
+fn take_rest(x: &[P3], garment: &mut GarmentMesh, collapsed: f64) {
     for (rest, f) in garment.rest.iter_mut().zip(&garment.faces) {
         let t = unfold(f.map(|v| x[v as usize].coords.cast()));
-        if rest_area(&t) > COLLAPSED * rest_area(rest) {
+        if rest_area(&t) > collapsed * rest_area(rest) {
             *rest = t;
         }
     }
@@ -327,11 +331,12 @@ mod tests {
 
     fn with_builder(test: impl Fn(&PieceBuilder<'_>)) {
         let template = embedded::template();
+        let settings = MeshGarmentSettings::with_edge(0.03);
         test(&PieceBuilder {
-            classifier: &PieceClassifier::new(&template),
+            classifier: &PieceClassifier::new(&template, &settings.classifier),
             name: "piece",
             material: &Material::preset("cotton").expect("preset"),
-            edge: 0.03,
+            settings: &settings,
         });
     }
 

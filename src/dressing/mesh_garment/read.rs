@@ -9,6 +9,7 @@ use crate::body_sections::BodySections;
 use crate::error::MeshGarmentError;
 use crate::finished::FinishedGarment;
 use crate::retarget::Retargeting;
+use crate::settings::MeshGarmentSettings;
 use crate::source_body::SourceBody;
 use crate::suggest::Suggestion;
 use std::path::Path;
@@ -42,11 +43,12 @@ pub struct MeshGarment {
     sizing: Option<Arc<Sizing>>,
     /// Size that it is in; `None` while it is made to measure.
     size: Option<Size>,
+    settings: MeshGarmentSettings,
 }
 
 impl MeshGarment {
     /// Reads a garment (`.obj`, `.glb`, `.gltf`, `.mhclo`) made on `body` (see [`SourceBody::read`]); without one a guess is
-    /// made. Meshes without flat panels get triangles with edges of `edge` metres, flat panels where theirs are shorter.
+    /// made.
     ///
     /// # Errors
     /// A fault of one of the files, by its edge, face or vertex.
@@ -54,13 +56,13 @@ impl MeshGarment {
         path: &Path,
         body: Option<&Path>,
         material: &Material,
-        edge: f64,
+        settings: &MeshGarmentSettings,
     ) -> Result<Self, MeshGarmentError> {
         Self::read_on(
             path,
             body.map(SourceBody::read).transpose()?,
             material,
-            edge,
+            settings,
         )
     }
     /// As [`Self::read`], on a body that has been read.
@@ -71,20 +73,20 @@ impl MeshGarment {
         path: &Path,
         body: Option<SourceBody>,
         material: &Material,
-        edge: f64,
+        settings: &MeshGarmentSettings,
     ) -> Result<Self, MeshGarmentError> {
         let file = read_mesh(path, body.as_ref().map(|b| b.file.as_slice()))?;
         let raw = file.sewn.obj.mesh.vertices();
         let has_binding = path.extension().is_some_and(|e| e == "mhclo");
         let source = match body {
             // The body lacks the vertices that the binding names: the file's own positions, moved over its skin.
-            Some(b) if has_binding && !file.bound => b.under(raw),
+            Some(b) if has_binding && !file.bound => b.under(raw, &settings.guess),
             Some(b) => b,
-            None => SourceBody::guess(raw)?,
+            None => SourceBody::guess_with(raw, &settings.guess)?,
         };
         let sewn = in_metres(file.sewn, &source)
             .map_err(|why| MeshGarmentError::Piece { piece: 0, why })?;
-        let mut out = Self::build(&file.name, &sewn, source, material, edge)?;
+        let mut out = Self::build(&file.name, &sewn, source, material, settings)?;
         if file.turned > 0 {
             out.notes.push(format!(
                 "{} faces turned over to agree with their neighbours",
@@ -93,8 +95,7 @@ impl MeshGarment {
         }
         Ok(out)
     }
-    /// A garment over a body in its rest pose, `mesh` in the frame of the body, metres; its triangles get edges of `edge`
-    /// metres.
+    /// A garment over a body in its rest pose, `mesh` in the frame of the body, metres.
     ///
     /// # Errors
     /// A fault of the mesh, by its edge, face or vertex.
@@ -103,7 +104,7 @@ impl MeshGarment {
         mesh: TriMesh,
         body: SourceBody,
         material: &Material,
-        edge: f64,
+        settings: &MeshGarmentSettings,
     ) -> Result<Self, MeshGarmentError> {
         let obj = ObjMesh {
             mesh,
@@ -114,7 +115,7 @@ impl MeshGarment {
             obj,
             stitches: Vec::new(),
         };
-        Self::build(name, &sewn, body, material, edge)
+        Self::build(name, &sewn, body, material, settings)
     }
     /// Pieces of a surface in the frame of the body, metres.
     fn build(
@@ -122,15 +123,15 @@ impl MeshGarment {
         sewn: &SewnObj,
         source: SourceBody,
         material: &Material,
-        edge: f64,
+        settings: &MeshGarmentSettings,
     ) -> Result<Self, MeshGarmentError> {
         let mut notes = vec![format!("made on {}", source.description)];
-        let classifier = PieceClassifier::new(&source.template);
+        let classifier = PieceClassifier::new(&source.template, &settings.classifier);
         let builder = PieceBuilder {
             classifier: &classifier,
             name,
             material,
-            edge,
+            settings,
         };
         let pieces = build(&builder, sewn, &mut notes)?;
         if pieces.is_empty() {
@@ -147,6 +148,7 @@ impl MeshGarment {
             layer: None,
             sizing: None,
             size: None,
+            settings: *settings,
         };
         if source.is_known {
             out.add_sizes(material);
@@ -160,6 +162,7 @@ impl MeshGarment {
             material,
             pieces: &self.pieces,
             positions: &self.off_skin(),
+            settings: &self.settings,
         };
         self.sizing = Sizing::new(&self.source, &cloth).map(Arc::new);
         if let Some(sizing) = &self.sizing {
@@ -169,7 +172,13 @@ impl MeshGarment {
     /// Vertices of each piece off the skin of the source body, metres.
     fn off_skin(&self) -> Vec<Vec<P3>> {
         let skin = SkinSearch::new(&self.source, self.source.mesh().vertices(), 0.0);
-        let piece = |p: &GarmentPiece| p.positions.iter().map(|p| lifted(&skin, *p)).collect();
+        let lift = &self.settings.lift;
+        let piece = |p: &GarmentPiece| {
+            p.positions
+                .iter()
+                .map(|p| lifted(&skin, *p, lift))
+                .collect()
+        };
         self.pieces.iter().map(piece).collect()
     }
     /// Size of the body that it was made on; `None` for a garment in one size, made to measure.
@@ -182,7 +191,7 @@ impl MeshGarment {
         let sizing = self.sizing.as_ref()?;
         let grading = sizing.grading(size);
         let pieces = self.pieces.iter().zip(self.off_skin());
-        let pieces = pieces.map(|(p, x)| p.in_size(size, &grading, &x));
+        let pieces = pieces.map(|(p, x)| p.in_size(size, &grading, &x, &self.settings.piece));
         Some(Self {
             pieces: pieces.collect(),
             size: Some(size),
@@ -241,10 +250,12 @@ impl MeshGarment {
         template: &Template,
         sections: &BodySections,
     ) -> Vec<(GarmentMesh, Vec<P3>)> {
-        let map = Retargeting::new(&self.source, template, sections);
+        let map = Retargeting::new(&self.source, template, sections, &self.settings.retarget);
         let skin = SkinSearch::new(template, &sections.vertices, 0.0);
         let pieces = self.pieces.iter();
-        pieces.map(|p| p.retargeted(&map, &skin)).collect()
+        pieces
+            .map(|p| p.retargeted(&map, &skin, &self.settings))
+            .collect()
     }
 }
 

@@ -3,7 +3,8 @@
 use super::grading::{Grading, LimbAxes};
 use super::piece::GarmentPiece;
 use crate::body_sections::{BodySections, SectionStack};
-use crate::finished::{FinishedGarment, HangsFrom, Hem, LEAST_EASE};
+use crate::finished::{FinishedGarment, HangsFrom, Hem};
+use crate::settings::{MeshGarmentSettings, SizeSettings};
 use crate::suggest::{Suggestion, body_girths, first_with_ease};
 use tryon_body::measure::{Measurements, measure};
 use tryon_body::parts::vertex_masks;
@@ -13,10 +14,6 @@ use tryon_geometry::math::P3;
 
 /// Trunk and legs: the skin of the girths at waist and hip.
 const BELOW: Region = Region::TRUNK.with(super::classifier::LEGS);
-/// Share of a body's girth below which cloth does not go around it.
-const AROUND: f64 = 0.8;
-/// Heights between which the chest is fullest, shares of the way from waist to shoulders.
-const CHEST: [f32; 2] = [0.35, 0.85];
 
 /// Cloth of a garment on the body it was made on.
 pub(super) struct SourceCloth<'a> {
@@ -25,6 +22,7 @@ pub(super) struct SourceCloth<'a> {
     pub(super) pieces: &'a [GarmentPiece],
     /// Vertices of each piece off the skin, metres.
     pub(super) positions: &'a [Vec<P3>],
+    pub(super) settings: &'a MeshGarmentSettings,
 }
 
 /// Sizes of one garment.
@@ -48,8 +46,9 @@ impl Sizing {
         let rest = source.personalise(&BodyShape::default());
         let body = measure(source, &rest).ok()?;
         let floor = rest.vertices.iter().map(|p| p.y).fold(f32::MAX, f32::min);
-        let sections = BodySections::new(source, &rest, Some(&body));
-        let heights = heights(source, &sections);
+        let settings = cloth.settings;
+        let sections = BodySections::new(source, &rest, Some(&body), &settings.sections);
+        let heights = heights(source, &sections, settings.chest);
         let [hip, waist, chest, _] = heights.map(|y| y as f32);
         let places = [(chest, Region::TRUNK), (waist, BELOW), (hip, BELOW)];
         let stacks = Stacks::cut(source, cloth);
@@ -58,7 +57,7 @@ impl Sizing {
             let (y, region) = places[k];
             stacks
                 .girth(y, region)
-                .filter(|g| *g > AROUND * skin[k])
+                .filter(|g| *g > settings.around * skin[k])
                 .unwrap_or(0.0)
         });
         let worn = |k: usize| (girths[k] > 0.0).then_some(skin[k]);
@@ -73,6 +72,7 @@ impl Sizing {
             GarmentKind::Skirt => HangsFrom::Waist,
             GarmentKind::Trousers => HangsFrom::Crotch,
         };
+        let least = settings.size.least_ease;
         let above = from.height(&body) - lowest.max(body.inseam);
         Some(Self {
             hem: [above, (body.inseam - lowest).max(0.0)],
@@ -81,7 +81,10 @@ impl Sizing {
                 kind,
                 size,
                 material: cloth.material.clone(),
-                least_ease: std::array::from_fn(|k| LEAST_EASE[k].min(girths[k] - skin[k])),
+                settings: SizeSettings {
+                    least_ease: std::array::from_fn(|k| least[k].min(girths[k] - skin[k])),
+                    ..settings.size
+                },
                 girths,
                 hem: Some(Hem {
                     from,
@@ -167,12 +170,13 @@ fn kind(pieces: &[GarmentPiece]) -> Option<GarmentKind> {
     })
 }
 
-/// Heights of hip, waist, chest and shoulders of a body at rest, metres.
-fn heights(source: &Template, sections: &BodySections) -> [f64; 4] {
+/// Heights of hip, waist, chest and shoulders of a body at rest, metres; the chest is fullest within `chest`, shares of the
+/// way from waist to shoulders.
+fn heights(source: &Template, sections: &BodySections, chest: [f32; 2]) -> [f64; 4] {
     let joint = source.skeleton().index("left_shoulder");
     let waist = sections.heights.waist;
     let shoulder = joint.map_or(waist + 0.4, |j| source.skeleton().joints()[j].rest.y as f32);
-    let [low, high] = CHEST.map(|t| waist + t * (shoulder - waist));
+    let [low, high] = chest.map(|t| waist + t * (shoulder - waist));
     let chest = sections.trunk.argmin(low..high, |s| -s.girth);
     [sections.heights.hip, waist, chest, shoulder].map(f64::from)
 }
@@ -190,7 +194,8 @@ impl Stacks {
             let parts: Vec<u8> = below
                 .map(|v| v.first().map_or(0, |v| masks[v.0 as usize]))
                 .collect();
-            let cut = |region| SectionStack::cut(x, &piece.garment.faces, &parts, region);
+            let (faces, spacing) = (&piece.garment.faces, cloth.settings.sections.spacing);
+            let cut = |region| SectionStack::cut(x, faces, &parts, region, spacing);
             [Region::TRUNK, BELOW].map(|region| (region, cut(region)))
         });
         Self(stacks.collect())
@@ -238,7 +243,8 @@ mod tests {
         let mesh = TriMesh::new((0..n * rows).map(point).collect(), faces).expect("a tube");
         let cotton = Material::preset("cotton").expect("a preset");
         let body = SourceBody::of_template(Arc::clone(body));
-        MeshGarment::on_body("tube", mesh, body, &cotton, 0.021).expect("a garment")
+        MeshGarment::on_body("tube", mesh, body, &cotton, &MeshGarmentSettings::default())
+            .expect("a garment")
     }
 
     fn body(template: &Template) -> Measurements {

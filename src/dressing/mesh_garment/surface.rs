@@ -1,16 +1,11 @@
 //! Orientation, texture coordinates and joint weights of a piece of cloth.
 
+use crate::settings::SurfaceSettings;
 use tryon_body::{SkinBinding, Template};
 use tryon_garment::GarmentMesh;
 use tryon_geometry::math::{P3, V3};
 use tryon_geometry::mesh::face_normal;
 
-/// Radius at which unrolled texture coordinates are lengths, metres: about a trunk's.
-const UNROLL_RADIUS: f32 = 0.15;
-/// Height below the hip joints over which a skirt comes to follow the legs alone, metres.
-const LEG_FADE: f32 = 0.12;
-/// Height over which a knee bends a skirt, metres.
-const KNEE: f32 = 0.10;
 /// Least half distance of the hip joints, metres.
 const LEAST_HIP: f32 = 0.05;
 
@@ -41,9 +36,9 @@ pub(super) fn orient_outwards(g: &mut GarmentMesh, x: &[P3], binding: &SkinBindi
     }
 }
 
-/// Sets texture coordinates around the vertical, metres, on a mesh whose own are no lengths.
-pub(super) fn unroll(g: &mut GarmentMesh, x: &[P3]) {
-    let at = |p: &P3| [p.x.atan2(p.z) * UNROLL_RADIUS, p.y];
+/// Sets texture coordinates around the vertical, lengths at `radius` metres, on a mesh whose own are no lengths.
+pub(super) fn unroll(g: &mut GarmentMesh, x: &[P3], radius: f32) {
+    let at = |p: &P3| [p.x.atan2(p.z) * radius, p.y];
     g.uv = x.iter().map(at).collect();
     let drawn = g.render.vertex.iter();
     g.render.uv = drawn.map(|v| at(&x[*v as usize])).collect();
@@ -52,7 +47,12 @@ pub(super) fn unroll(g: &mut GarmentMesh, x: &[P3]) {
 /// Lets a skirt below the crotch follow both legs, each the more the nearer it is.
 ///
 /// The nearest skin alone would pull the middle of the skirt up between the legs.
-pub(super) fn follow_both_legs(template: &Template, x: &[P3], binding: &mut SkinBinding) {
+pub(super) fn follow_both_legs(
+    template: &Template,
+    x: &[P3],
+    binding: &mut SkinBinding,
+    settings: &SurfaceSettings,
+) {
     let sk = template.skeleton();
     let at = |n: &str| sk.index(n).map(|j| (j, sk.joints()[j].rest.cast::<f32>()));
     let side = |s: &str| Some([at(&format!("{s}_hip"))?, at(&format!("{s}_knee"))?]);
@@ -68,7 +68,7 @@ pub(super) fn follow_both_legs(template: &Template, x: &[P3], binding: &mut Skin
             .zip(&is_arm)
             .filter_map(|(w, a)| a.then_some(w))
             .sum();
-        let legs = smooth((left[0].1.y - p.y) / LEG_FADE) * (1.0 - arm);
+        let legs = smooth((left[0].1.y - p.y) / settings.leg_fade) * (1.0 - arm);
         if legs <= 0.0 {
             continue;
         }
@@ -77,7 +77,7 @@ pub(super) fn follow_both_legs(template: &Template, x: &[P3], binding: &mut Skin
         }
         let share = smooth(0.5 + 0.5 * p.x / left[0].1.x.abs().max(LEAST_HIP));
         for ([hip, knee], w) in [(left, legs * share), (right, legs * (1.0 - share))] {
-            let below = smooth(0.5 + (knee.1.y - p.y) / KNEE);
+            let below = smooth(0.5 + (knee.1.y - p.y) / settings.knee);
             row[hip.0] += w * (1.0 - below);
             row[knee.0] += w * below;
         }

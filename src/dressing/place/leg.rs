@@ -5,22 +5,20 @@ use super::placed_body::{PlacedBody, ends, sign};
 use super::tube::{Ellipse, HALF_PANELS};
 use crate::body_sections::BodySections;
 use crate::finished::{CROTCH_CLEARANCE, DEFAULT_RISE};
+use crate::settings::{LegPlaceSettings, PlaceSettings};
 use std::f32::consts::{FRAC_PI_2, PI};
 use tryon_garment::{Panel, Side};
 use tryon_geometry::math::P3;
 
-/// Least distance of a trouser leg from the sagittal plane, metres: closer, the legs start in each other.
-const INSEAM_GAP: f32 = 0.001;
 /// Height of the crotch line of a panel without one, panel coordinates, metres.
 const DEFAULT_HIP_LINE: f64 = -0.2;
-/// Highest section of one leg alone, metres below the crotch.
-const LEG_TOP: f32 = 0.04;
 /// Least width of a row, metres.
 const LEAST_WIDTH: f32 = 1e-4;
 
 /// Chart of the front or back panel of one leg.
 pub(super) struct LegChart<'a> {
     sections: &'a BodySections,
+    settings: &'a PlaceSettings,
     outline: PanelOutline,
     side: Side,
     front: bool,
@@ -43,6 +41,7 @@ impl<'a> LegChart<'a> {
         let outline = PanelOutline::of(panel);
         Self {
             sections: body.sections,
+            settings: body.settings,
             side,
             front,
             waist: (heights.fork - CROTCH_CLEARANCE as f32 - rise).min(heights.waist),
@@ -53,6 +52,11 @@ impl<'a> LegChart<'a> {
         }
     }
     pub(super) fn point(&self, p: [f32; 2]) -> P3 {
+        let PlaceSettings {
+            tube,
+            leg: LegPlaceSettings { inseam_gap, top },
+            ..
+        } = self.settings;
         let (left, front) = (sign(self.side), if self.front { 1.0 } else { -1.0 });
         // Share of the row from the inner to the outer side.
         let [lo, hi] = self.outline.span(p[1]);
@@ -62,15 +66,15 @@ impl<'a> LegChart<'a> {
         let y = self.waist + p[1];
 
         let leg = &self.sections.legs[usize::from(self.side == Side::Right)];
-        let section = leg.at(y.min(self.sections.heights.crotch - LEG_TOP));
+        let section = leg.at(y.min(self.sections.heights.crotch - top));
         let Ellipse { center: c, half } =
-            Ellipse::around(&section, 2.0 * (hi - lo).min(2.0 * self.half));
+            Ellipse::around(&section, 2.0 * (hi - lo).min(2.0 * self.half), tube);
         let on_leg = [
             c[0] - left * half[0] * (PI * t).cos(),
             c[1] + front * half[1] * (PI * t).sin(),
         ];
         let Ellipse { center: c, half } =
-            Ellipse::around(&self.sections.lower.at(y), HALF_PANELS * (hi - lo));
+            Ellipse::around(&self.sections.lower.at(y), HALF_PANELS * (hi - lo), tube);
         let on_hip = [
             c[0] + left * half[0] * (FRAC_PI_2 * t).sin(),
             c[1] + front * half[1] * (FRAC_PI_2 * t).cos(),
@@ -80,6 +84,6 @@ impl<'a> LegChart<'a> {
         let share = share * share * (3.0 - 2.0 * share);
         let mix = |k: usize| on_leg[k] + (on_hip[k] - on_leg[k]) * share;
         // Each trouser leg stays on its own side where the thighs touch.
-        P3::new(left * (left * mix(0)).max(INSEAM_GAP), y, mix(1))
+        P3::new(left * (left * mix(0)).max(*inseam_gap), y, mix(1))
     }
 }

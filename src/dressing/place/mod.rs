@@ -11,3 +11,4 @@ pub(crate) mod trunk;
 mod tube;
 
 pub(super) use panels::place;
+pub(super) use placed_body::PlacedBody;

@@ -6,27 +6,16 @@ use super::placed_body::PlacedBody;
 use super::skirt::SkirtChart;
 use super::sleeve::SleeveChart;
 use super::trunk::TrunkChart;
-use crate::body_sections::BodySections;
-use tryon_body::Template;
-use tryon_garment::{GarmentMesh, Panel, Pattern, Placement};
+use tryon_garment::{GarmentMesh, Panel, Placement};
 use tryon_geometry::math::{P3, V3};
 
 /// Start positions of the simulation vertices, frame of the canonical body (root identity), metres.
-pub(crate) fn place(
-    template: &Template,
-    sections: &BodySections,
-    pattern: &Pattern,
-    mesh: &GarmentMesh,
-) -> Vec<P3> {
-    let body = PlacedBody {
-        template,
-        sections,
-        pattern,
-    };
-    let charts: Vec<PanelChart<'_>> = pattern
+pub(crate) fn place(body: &PlacedBody<'_>, mesh: &GarmentMesh) -> Vec<P3> {
+    let charts: Vec<PanelChart<'_>> = body
+        .pattern
         .panels
         .iter()
-        .map(|p| PanelChart::new(&body, p))
+        .map(|p| PanelChart::new(body, p))
         .collect();
     mesh.corners
         .iter()
@@ -77,6 +66,8 @@ impl<'a> PanelChart<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::body_sections::BodySections;
+    use crate::settings::StageSettings;
     use tryon_body::{BodyShape, embedded};
     use tryon_garment::{Size, Triangulation, library};
 
@@ -84,7 +75,8 @@ mod tests {
     fn charts_of_panels_meet_at_their_seams() {
         let template = embedded::template();
         let rest = template.personalise(&BodyShape::default());
-        let sections = BodySections::new(&template, &rest, None);
+        let settings = StageSettings::default();
+        let sections = BodySections::new(&template, &rest, None, &settings.sections);
         for (name, most) in [
             ("skirt", 0.005),
             ("straight_skirt", 0.035),
@@ -96,6 +88,7 @@ mod tests {
                 template: &template,
                 sections: &sections,
                 pattern: &pattern,
+                settings: &settings.place,
             };
             let panels = pattern.panels.iter();
             let charts: Vec<_> = panels.map(|p| PanelChart::new(&body, p)).collect();

@@ -1,14 +1,13 @@
 //! A pattern's shoulder seams on a body: they fix the height of every panel above the waist.
 
 use crate::body_sections::BodySections;
+use crate::settings::PlaceSettings;
 use tryon_body::Template;
 use tryon_body::parts::BodySegment;
 use tryon_garment::{Panel, Pattern, Placement, Side};
 
 /// Neck and tip end of a shoulder seam where a pattern has none, panel coordinates, metres (library T-shirt, M).
 const DEFAULT_SEAM: [[f64; 2]; 2] = [[0.08, 0.0], [0.2, -0.04]];
-/// Clearance of the shoulder seam over the skin, metres: less sinks in where the shoulder is hollow.
-const SEAM_CLEARANCE: f32 = 0.008;
 /// Stations along the seam at which the shoulder's height is taken.
 const STATIONS: usize = 12;
 /// Height of a shoulder seam over bodies without shoulders, metres.
@@ -16,10 +15,11 @@ const DEFAULT_HEIGHT: f32 = 1.4;
 
 /// The body in the canonical pose and the pattern that is placed around it.
 #[derive(Clone, Copy)]
-pub(super) struct PlacedBody<'a> {
-    pub(super) template: &'a Template,
-    pub(super) sections: &'a BodySections,
-    pub(super) pattern: &'a Pattern,
+pub(crate) struct PlacedBody<'a> {
+    pub(crate) template: &'a Template,
+    pub(crate) sections: &'a BodySections,
+    pub(crate) pattern: &'a Pattern,
+    pub(crate) settings: &'a PlaceSettings,
 }
 
 /// 1 on the left (+x), −1 on the right.
@@ -71,7 +71,7 @@ impl PlacedBody<'_> {
             }
             let t = (k as f32 + 0.5) / STATIONS as f32;
             let panel_y = (neck[1] as f32) * (1.0 - t) + tip[1] as f32 * t;
-            top = top.max(y + SEAM_CLEARANCE - panel_y);
+            top = top.max(y + self.settings.seam_clearance - panel_y);
             z = (z.0 + pz, z.1 + 1.0);
         }
         if z.1 > 0.0 {

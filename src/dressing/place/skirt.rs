@@ -4,6 +4,7 @@ use super::outline::{PanelOutline, sample_edges};
 use super::placed_body::PlacedBody;
 use super::tube::{Ellipse, HALF_PANELS};
 use crate::body_sections::BodySections;
+use crate::settings::PlaceSettings;
 use std::f32::consts::FRAC_PI_2;
 use tryon_garment::{Curve, Panel};
 use tryon_geometry::math::P3;
@@ -14,10 +15,6 @@ const CHORDS: usize = 8;
 const DEFAULT_END: [f64; 2] = [0.0, 0.02];
 /// Least sag of the waist line, metres: a straight one would have its apex at infinity.
 const LEAST_SAG: f64 = 1e-4;
-/// Share of its length over which a skirt starts: it settles downwards.
-const SHORTENED: f32 = 0.97;
-/// Least height of a waistband above the hip, metres: lower it slides off.
-const ABOVE_HIP: f32 = 0.05;
 /// Step and tolerance in which the height of a waistband is searched, metres of height and of girth.
 const WAIST_STEP: f32 = 0.01;
 /// Least half width of a row, metres.
@@ -26,6 +23,7 @@ const LEAST_HALF: f32 = 0.02;
 /// Chart of a front or back panel.
 pub(super) struct SkirtChart<'a> {
     sections: &'a BodySections,
+    settings: &'a PlaceSettings,
     outline: PanelOutline,
     /// 1 in front, −1 behind.
     side: f32,
@@ -67,11 +65,12 @@ impl<'a> SkirtChart<'a> {
         };
         Self {
             sections: body.sections,
+            settings: body.settings,
             outline: PanelOutline::of(panel),
             side: if front { 1.0 } else { -1.0 },
             waist: body
                 .sewn_waist()
-                .unwrap_or_else(|| waist_height(body.sections, girth)),
+                .unwrap_or_else(|| waist_height(body, girth)),
             rows,
         }
     }
@@ -80,7 +79,7 @@ impl<'a> SkirtChart<'a> {
             SkirtRows::Arcs { apex, half_angle } => {
                 let (r, angle) = (p[0].hypot(apex - p[1]), p[0].atan2(apex - p[1]));
                 (
-                    self.waist - (r - apex) * SHORTENED,
+                    self.waist - (r - apex) * self.settings.skirt.shortened,
                     (angle / half_angle).clamp(-1.0, 1.0) * FRAC_PI_2,
                     HALF_PANELS * half_angle * r,
                 )
@@ -94,14 +93,16 @@ impl<'a> SkirtChart<'a> {
                 )
             }
         };
-        Ellipse::rounded(&self.sections.lower.at(y), girth).point(y, turn, self.side)
+        Ellipse::rounded(&self.sections.lower.at(y), girth, &self.settings.tube)
+            .point(y, turn, self.side)
     }
 }
 
 /// Height of a waistband of this girth: the waist, or lower where the hip becomes as wide as the band, metres.
-fn waist_height(sections: &BodySections, girth: f32) -> f32 {
+fn waist_height(body: &PlacedBody<'_>, girth: f32) -> f32 {
+    let (sections, above_hip) = (body.sections, body.settings.skirt.above_hip);
     let mut waist = sections.heights.waist;
-    while waist > sections.heights.hip + ABOVE_HIP
+    while waist > sections.heights.hip + above_hip
         && sections.lower.at(waist).girth < girth - WAIST_STEP
     {
         waist -= WAIST_STEP;

@@ -2,8 +2,6 @@
 
 use super::outline::PanelOutline;
 use super::placed_body::{PlacedBody, sign};
-use super::tube::CLEARANCE;
-use crate::body_sections::BodySections;
 use std::f32::consts::PI;
 use tryon_garment::{Panel, Region, Side};
 use tryon_geometry::math::{P3, V3};
@@ -12,8 +10,6 @@ use tryon_geometry::math::{P3, V3};
 const STATION: f32 = 0.01;
 /// Stations on either side over which the largest arm radius counts.
 const NEIGHBOURS: usize = 2;
-/// Length of arm at the armhole that is measured farther out, metres: the skin is open there.
-const ARMHOLE: f32 = 0.07;
 /// ArmShape radius beyond the measured stations, metres.
 const DEFAULT_RADIUS: f32 = 0.05;
 /// Share of the half width from which a corner of the outline belongs to the bicep line.
@@ -29,6 +25,8 @@ pub(super) struct SleeveChart {
     outline: PanelOutline,
     side: Side,
     arm: ArmShape,
+    /// Clearance over the skin, metres.
+    clearance: f32,
     /// Distance along the arm of the panel's y = 0.
     start: f32,
     /// Half width of the panel and the height where it has it: above is the cap.
@@ -54,6 +52,7 @@ impl SleeveChart {
             outline,
             side,
             arm,
+            clearance: body.settings.tube.clearance,
             start,
             bicep,
             cap,
@@ -81,7 +80,7 @@ impl SleeveChart {
         let r = self
             .arm
             .radius_at(s)
-            .map(|r| (r + CLEARANCE).max(half / PI));
+            .map(|r| (r + self.clearance).max(half / PI));
         let angle = PI * p[0] / half;
         centre + up * (r[0] * angle.cos()) + front * (-sign(self.side) * r[1] * angle.sin())
     }
@@ -113,7 +112,7 @@ impl ArmShape {
             joints: [shoulder, elbow, wrist],
             radius: Vec::new(),
         };
-        out.radius = out.measure_radius(body.sections, side);
+        out.radius = out.measure_radius(body, side);
         out
     }
     fn upper_length(&self) -> f32 {
@@ -127,7 +126,7 @@ impl ArmShape {
         let i = ((s / STATION).max(0.0) as usize).min(self.radius.len().saturating_sub(1));
         self.radius.get(i).copied().unwrap_or([DEFAULT_RADIUS; 2])
     }
-    fn measure_radius(&self, sections: &BodySections, side: Side) -> Vec<[f32; 2]> {
+    fn measure_radius(&self, body: &PlacedBody<'_>, side: Side) -> Vec<[f32; 2]> {
         let mask = if side == Side::Left {
             Region::LEFT_ARM
         } else {
@@ -137,7 +136,7 @@ impl ArmShape {
         let directions = [self.direction(0), self.direction(1)];
         let n = ((upper + (wrist - elbow).norm()) / STATION) as usize + 1;
         let mut radius = vec![[0.0f32; 2]; n];
-        let own = sections.vertices.iter().zip(&sections.parts);
+        let own = body.sections.vertices.iter().zip(&body.sections.parts);
         for (p, _) in own.filter(|(_, part)| **part & mask.0 != 0) {
             let s = (p - self.joints[0]).dot(&directions[0]);
             let (s, bone) = if s <= upper {
@@ -155,13 +154,13 @@ impl ArmShape {
             let r = &mut radius[i as usize];
             *r = [r[0].max(up), r[1].max(d.z.abs())];
         }
-        widen(&radius)
+        widen(&radius, body.settings.armhole)
     }
 }
 
-/// Largest radius around each station; stations at the armhole take those farther out.
-fn widen(radius: &[[f32; 2]]) -> Vec<[f32; 2]> {
-    let (n, inner) = (radius.len(), (ARMHOLE / STATION) as usize);
+/// Largest radius around each station; stations within `armhole` metres take those farther out.
+fn widen(radius: &[[f32; 2]], armhole: f32) -> Vec<[f32; 2]> {
+    let (n, inner) = (radius.len(), (armhole / STATION) as usize);
     let around = |i: usize, k: usize| {
         let i = i.max(inner);
         (i.saturating_sub(NEIGHBOURS)..(i + NEIGHBOURS + 1).min(n))

@@ -4,24 +4,20 @@ use super::outline::PanelOutline;
 use super::placed_body::{PlacedBody, ends};
 use super::tube::{Ellipse, HALF_PANELS, quarter_circle};
 use crate::body_sections::BodySections;
+use crate::settings::PlaceSettings;
 use std::f32::consts::FRAC_PI_2;
 use tryon_garment::Panel;
 use tryon_geometry::math::P3;
 
-/// Depth over which a shirt turns over the shoulder, metres: less makes a sharp crease there.
-const SHOULDER_DEPTH: f32 = 0.10;
 /// Least half width of a row, metres.
 const LEAST_HALF: f32 = 0.05;
-/// Rows this far below the armpit go around the legs too, metres: a long top over the hips.
-const LOWER_BODY: f32 = 0.05;
-/// An underarm point lies at least this far outside and below the shoulder tip, metres.
-const UNDERARM: [f64; 2] = [0.01, 0.05];
 /// Underarm point of a panel that has none, panel coordinates, metres (library T-shirt, M).
 const DEFAULT_UNDERARM: [f64; 2] = [0.26, -0.22];
 
 /// Chart of a front or back panel.
 pub(super) struct TrunkChart<'a> {
     sections: &'a BodySections,
+    settings: &'a PlaceSettings,
     outline: PanelOutline,
     front: bool,
     /// Height of the panel's y = 0 and z of the shoulder seam.
@@ -39,12 +35,13 @@ pub(super) struct TrunkChart<'a> {
 impl<'a> TrunkChart<'a> {
     pub(super) fn new(body: &PlacedBody<'a>, panel: &Panel, front: bool) -> Self {
         let [neck, tip] = body.shoulder_seam();
+        let [outside, below] = body.settings.trunk.underarm;
         // Without an armhole: the highest corner outside the shoulder tip.
         let underarm = ends(panel, "armhole_right").map_or_else(
             || {
                 let corners = panel.edges.iter().map(|e| [e.from[0].abs(), e.from[1]]);
                 corners
-                    .filter(|p| p[0] > tip[0] + UNDERARM[0] && p[1] < tip[1] - UNDERARM[1])
+                    .filter(|p| p[0] > tip[0] + outside && p[1] < tip[1] - below)
                     .max_by(|a, b| a[1].total_cmp(&b[1]))
                     .unwrap_or(DEFAULT_UNDERARM)
             },
@@ -53,6 +50,7 @@ impl<'a> TrunkChart<'a> {
         let (top, shoulder_z) = body.shoulder_line();
         Self {
             sections: body.sections,
+            settings: body.settings,
             outline: PanelOutline::of(panel),
             front,
             top,
@@ -66,7 +64,11 @@ impl<'a> TrunkChart<'a> {
     }
     pub(super) fn point(&self, p: [f32; 2]) -> P3 {
         let &Self {
-            armpit, fall, neck, ..
+            armpit,
+            fall,
+            neck,
+            settings,
+            ..
         } = self;
         let x = if self.front { p[0] } else { -p[0] };
         let y = self.top + p[1];
@@ -75,7 +77,7 @@ impl<'a> TrunkChart<'a> {
         } else {
             self.half
         };
-        let section = if p[1] < armpit - LOWER_BODY {
+        let section = if p[1] < armpit - settings.trunk.lower_body {
             self.sections.lower.at(y)
         } else {
             self.sections.trunk.at(y)
@@ -83,14 +85,14 @@ impl<'a> TrunkChart<'a> {
         let Ellipse {
             center: c,
             half: [a, b],
-        } = Ellipse::around(&section, HALF_PANELS * width);
+        } = Ellipse::around(&section, HALF_PANELS * width, &settings.tube);
         let angle = FRAC_PI_2 * (x / width).clamp(-1.0, 1.0);
         // From the armpit up rows straighten towards the shoulder seam.
         let up = ((p[1] - armpit) / (-fall - armpit)).clamp(0.0, 1.0);
         let wx = (1.0 - up) * (c[0] + a * angle.sin()) + up * x;
         let ellipse_z = c[1] + if self.front { b } else { -b } * angle.cos();
         let seam_y = -fall * ((x.abs() - neck) / (self.tip - neck)).clamp(0.0, 1.0);
-        let below = ((seam_y - p[1]) / SHOULDER_DEPTH).clamp(0.0, 1.0);
+        let below = ((seam_y - p[1]) / settings.trunk.shoulder_depth).clamp(0.0, 1.0);
         let z = self.shoulder_z + (ellipse_z - self.shoulder_z) * quarter_circle(below);
         P3::new(wx, y, z)
     }

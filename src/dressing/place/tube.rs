@@ -1,15 +1,12 @@
 //! Elliptic tubes around cross-sections of the body.
 
 use crate::body_sections::CrossSection;
+use crate::settings::TubeSettings;
 use std::f32::consts::PI;
 use tryon_geometry::math::P3;
 
-/// Clearance between body and cloth at the start, metres: less starts inside the skin, more falls farther.
-pub(super) const CLEARANCE: f32 = 0.015;
 /// Half panels in a full girth: left and right of front and back.
 pub(super) const HALF_PANELS: f32 = 4.0;
-/// Largest factor by which a wide garment widens the body's ellipse; a tent is draped from there.
-const WIDEST: f32 = 1.6;
 
 /// An ellipse in a horizontal plane, metres.
 #[derive(Clone, Copy)]
@@ -21,31 +18,32 @@ pub(super) struct Ellipse {
 }
 
 impl Ellipse {
-    /// Around a cross-section with [`CLEARANCE`], scaled up to `girth` where the garment is wider than the body.
-    pub(super) fn around(section: &CrossSection, girth: f32) -> Self {
+    /// Around a cross-section with clearance, scaled up to `girth` where the garment is wider than the body.
+    pub(super) fn around(section: &CrossSection, girth: f32, settings: &TubeSettings) -> Self {
+        let &TubeSettings { clearance, widest } = settings;
         let center = [
             (section.x[0] + section.x[1]) / 2.0,
             (section.z[0] + section.z[1]) / 2.0,
         ];
         let (a, b) = (
-            (section.x[1] - section.x[0]) / 2.0 + CLEARANCE,
-            (section.z[1] - section.z[0]) / 2.0 + CLEARANCE,
+            (section.x[1] - section.x[0]) / 2.0 + clearance,
+            (section.z[1] - section.z[0]) / 2.0 + clearance,
         );
         // Ramanujan's second approximation of the perimeter.
         let h = ((a - b) / (a + b)).powi(2);
         let perimeter = PI * (a + b) * (1.0 + 3.0 * h / (10.0 + (4.0 - 3.0 * h).sqrt()));
-        let wider = (girth / perimeter).clamp(1.0, WIDEST);
+        let wider = (girth / perimeter).clamp(1.0, widest);
         Self {
             center,
             half: [a * wider, b * wider],
         }
     }
     /// As [`Self::around`], with spare girth spread evenly: the circle of that girth where it clears the body.
-    pub(super) fn rounded(section: &CrossSection, girth: f32) -> Self {
+    pub(super) fn rounded(section: &CrossSection, girth: f32, settings: &TubeSettings) -> Self {
         let Self {
             center,
             half: [mut a, mut b],
-        } = Self::around(section, 0.0);
+        } = Self::around(section, 0.0, settings);
         let r = girth / (2.0 * PI);
         a = a.max(r.min(a.max(b) * 2.0));
         b = b.max(r.min(a.max(b) * 2.0));
@@ -80,13 +78,14 @@ mod tests {
             z: [-0.1, 0.1],
             girth: 0.2 * PI,
         };
-        let snug = Ellipse::around(&section, 0.0).half;
+        let tube = TubeSettings::default();
+        let snug = Ellipse::around(&section, 0.0, &tube).half;
         assert!(snug.iter().all(|r| (r - 0.115).abs() < 1e-6), "{snug:?}");
-        for (girth, r) in [(2.0 * PI * 0.15, 0.15), (9.0, 0.115 * WIDEST)] {
-            let half = Ellipse::around(&section, girth).half;
+        for (girth, r) in [(2.0 * PI * 0.15, 0.15), (9.0, 0.115 * tube.widest)] {
+            let half = Ellipse::around(&section, girth, &tube).half;
             assert!(half.iter().all(|h| (h - r).abs() < 1e-4), "{half:?}");
         }
-        let round = Ellipse::rounded(&section, 2.0 * PI * 0.2);
+        let round = Ellipse::rounded(&section, 2.0 * PI * 0.2, &tube);
         let p = round.point(1.0, 0.3, -1.0);
         assert!((p.x.hypot(p.z) - 0.2).abs() < 1e-5 && p.z < 0.0);
     }

@@ -7,17 +7,23 @@ use std::collections::{BTreeMap, BTreeSet};
 use tryon_geometry::math::P3;
 use tryon_geometry::math::order_statistics::median;
 use tryon_geometry::mesh::{Face, sides, undirected};
+use tryon_geometry::settings;
 
-/// Edges shorter than this times the target are collapsed (Botsch & Kobbelt 2004).
-const COLLAPSE: f64 = 4.0 / 5.0;
-/// No collapse makes an edge longer than this times the target.
-const LONGEST: f64 = 1.6;
-/// Smallest angle that a collapse may make, or none smaller than there was, degrees.
-const ANGLE: f64 = 18.0;
-/// Largest distance of seams and rims from their course, over the target edge length.
-const OFF_COURSE: f64 = 0.1;
-/// Passes over all edges: each may halve the number of vertices.
-const PASSES: usize = 16;
+settings! {
+    /// Settings of the coarsening.
+    pub struct CoarsenSettings {
+        /// Length over the target below which edges collapse (Botsch & Kobbelt 2004).
+        pub collapse: f64 = 4.0 / 5.0,
+        /// Longest edge that a collapse may make, over the target.
+        pub longest: f64 = 1.6,
+        /// Smallest angle that a collapse may make, or none smaller than there was, degrees.
+        pub angle: f64 = 18.0,
+        /// Largest distance of seams and hems from their course, over the target. Larger changes the cut.
+        pub off_course: f64 = 0.1,
+        /// Passes over all edges: each may halve the number of vertices.
+        pub passes: usize = 16,
+    }
+}
 
 type P2 = [f64; 2];
 
@@ -27,6 +33,7 @@ struct Coarsener {
     rest: Vec<[P2; 3]>,
     around: Vec<Vec<u32>>,
     target: f64,
+    settings: CoarsenSettings,
 }
 
 fn sub(a: P2, b: P2) -> P2 {
@@ -75,7 +82,7 @@ impl Coarsener {
         }
         let mut out: Vec<_> = all
             .into_iter()
-            .filter(|(_, l)| *l < COLLAPSE * self.target)
+            .filter(|(_, l)| *l < self.settings.collapse * self.target)
             .collect();
         out.sort_by(|a, b| a.1.total_cmp(&b.1).then(a.0.cmp(&b.0)));
         out.into_iter().map(|(e, _)| e).collect()
@@ -137,21 +144,21 @@ impl Coarsener {
                     let chord = sub(place, end);
                     let off = cross(chord, sub(at[copy], end)).abs()
                         / length(chord).max(f64::MIN_POSITIVE);
-                    if off > OFF_COURSE * self.target {
+                    if off > self.settings.off_course * self.target {
                         return None;
                     }
                 }
                 _ => return None,
             }
         }
-        let good = ANGLE.to_radians().sin();
+        let good = self.settings.angle.to_radians().sin();
         for (f, (sim, loose)) in here().filter(|(_, (sim, _))| corner(sim, w).is_none()) {
             let i = corner(&sim, v)?;
             let old = self.rest[f];
             let mut new = old;
             new[i] = moves.get(&loose[i])?.1;
-            let long =
-                (0..3).any(|k| length(sub(new[k], new[(k + 1) % 3])) > LONGEST * self.target);
+            let longest = self.settings.longest * self.target;
+            let long = (0..3).any(|k| length(sub(new[k], new[(k + 1) % 3])) > longest);
             let (before, after) = (quality(&old), quality(&new));
             if long || before * after <= 0.0 || after.abs() < good.min(before.abs()) {
                 return None;
@@ -187,7 +194,12 @@ pub fn median_edge(g: &GarmentMesh) -> f64 {
 }
 
 /// The same panels and seams on some of the vertices, with edges of about `target` metres at rest; and their positions.
-pub fn coarsen(g: &GarmentMesh, positions: &[P3], target: f64) -> (GarmentMesh, Vec<P3>) {
+pub fn coarsen(
+    g: &GarmentMesh,
+    positions: &[P3],
+    target: f64,
+    settings: &CoarsenSettings,
+) -> (GarmentMesh, Vec<P3>) {
     let mut around = vec![Vec::new(); g.vertices];
     for (i, f) in g.faces.iter().enumerate() {
         f.iter().for_each(|v| around[*v as usize].push(i as u32));
@@ -203,8 +215,9 @@ pub fn coarsen(g: &GarmentMesh, positions: &[P3], target: f64) -> (GarmentMesh, 
         rest: g.rest.clone(),
         around,
         target,
+        settings: *settings,
     };
-    for _ in 0..PASSES {
+    for _ in 0..settings.passes {
         let mut gone = BTreeSet::new();
         for (a, b) in c.short() {
             // Each vertex takes part in one collapse a pass, so that all panels thin out evenly.
@@ -311,7 +324,7 @@ mod tests {
         let at: Vec<P3> = (0..fine.vertices)
             .map(|i| P3::new(i as f32, 0.0, 0.0))
             .collect();
-        let (coarse, kept) = coarsen(&fine, &at, 0.024);
+        let (coarse, kept) = coarsen(&fine, &at, 0.024, &CoarsenSettings::default());
         assert!(
             coarse.vertices * 6 < fine.vertices,
             "{} of {}",
@@ -358,7 +371,7 @@ mod tests {
         )
         .expect("sewn");
         let at = vec![P3::origin(); g.vertices];
-        let (same, _) = coarsen(&g, &at, 0.01);
+        let (same, _) = coarsen(&g, &at, 0.01, &CoarsenSettings::default());
         assert_eq!((same.vertices, &same.faces), (g.vertices, &g.faces));
         assert!((median_edge(&g) - 0.03).abs() < 0.01);
     }

@@ -6,7 +6,7 @@ pub(crate) mod garmentcode;
 mod mesh;
 
 pub use super::flat_triangle::{unfold, widened};
-pub use coarsen::{coarsen, median_edge};
+pub use coarsen::{CoarsenSettings, coarsen, median_edge};
 pub use file::{MeshFile, read_mesh, some_faces, split};
 pub use garmentcode::from_garmentcode;
 pub use mesh::{ImportedMesh, from_mesh, panels_in_metres};

@@ -1,6 +1,6 @@
 //! Garments by name.
 
-use super::{dress, skirt, top, trousers};
+use super::{LibraryCuts, dress, skirt, top, trousers};
 use crate::{GarmentError, Pattern, Size, size_table};
 
 /// Names of all garments, in display order.
@@ -42,17 +42,25 @@ pub fn dye(name: &str) -> [u8; 3] {
 /// # Errors
 /// Unknown name; the known ones are listed.
 pub fn pattern(name: &str, size: Size) -> Result<Pattern, GarmentError> {
+    pattern_with(name, size, &LibraryCuts::default())
+}
+
+/// As [`pattern`], with other cuts.
+///
+/// # Errors
+/// As [`pattern`], and a cut that closes no panel.
+pub fn pattern_with(name: &str, size: Size, cuts: &LibraryCuts) -> Result<Pattern, GarmentError> {
     let row = size_table()[size as usize];
     let p = match name {
-        "tshirt" => top::tshirt(&row)?,
-        "longsleeve" => top::longsleeve(&row)?,
-        "tank" => top::tank(&row)?,
-        "hoodie" => top::hoodie(&row)?,
-        "dress" => dress::flared(&row)?,
-        "skirt" => skirt::flared(&row)?,
-        "straight_skirt" => skirt::straight(&row)?,
-        "trousers" => trousers::long(&row)?,
-        "shorts" => trousers::shorts(&row)?,
+        "tshirt" => top::draft(&row, name, "jersey", &cuts.tshirt)?,
+        "longsleeve" => top::draft(&row, name, "cotton", &cuts.longsleeve)?,
+        "tank" => top::draft(&row, name, "jersey", &cuts.tank)?,
+        "hoodie" => top::draft(&row, name, "fleece", &cuts.hoodie)?,
+        "dress" => dress::flared(&row, &cuts.dress)?,
+        "skirt" => skirt::flared(&row, &cuts.skirt)?,
+        "straight_skirt" => skirt::straight(&row, &cuts.straight_skirt)?,
+        "trousers" => trousers::draft(&row, name, "denim", &cuts.trousers)?,
+        "shorts" => trousers::draft(&row, name, "twill", &cuts.shorts)?,
         _ => {
             return Err(GarmentError::UnknownGarment {
                 name: name.to_owned(),

@@ -1,25 +1,16 @@
 //! A sleeveless dress: bodice shaped by waist darts, flared skirt to the knee.
 
+use super::cuts::DressCut;
 use super::draft::{flip, panel, sewn};
-use super::skirt::{DART_AT, HIP_DEPTH, Sector, darts, flare};
-use super::top::{SHOULDER_FALL, shoulders, trunk_seams, yoke};
+use super::skirt::{Sector, darts, flare};
+use super::top::{shoulders, trunk_seams, yoke};
 use crate::{
     Anchor, Curve, GarmentError, GarmentKind, Material, Panel, Pattern, Placement, SizeRow,
 };
 
-/// Ease at chest, waist and hip, metres.
-const EASE: [f64; 3] = [0.06, 0.04, 0.10];
-/// Width of each of the four darts, metres.
-const DART: f64 = 0.026;
-/// Depth of the darts, front and back, metres.
-const DART_DEPTH: [f64; 2] = [0.12, 0.14];
-/// Waist to hem, metres.
-const SKIRT: f64 = 0.58;
-/// Depth of the front and back neckline, metres.
-const DROP: [f64; 2] = [0.105, 0.045];
-
 /// Measures of the bodice, metres.
-struct Bodice {
+struct Bodice<'a> {
+    cut: &'a DressCut,
     /// Half width of a panel at the chest, and at the waist before the darts are sewn.
     half: f64,
     cut_waist: f64,
@@ -31,10 +22,11 @@ struct Bodice {
     length: f64,
 }
 
-impl Bodice {
-    /// A panel with a neckline `drop` and darts `depth` metres deep.
-    fn panel(&self, name: &str, placement: Placement, drop: f64, depth: f64) -> Panel {
+impl Bodice<'_> {
+    /// The front (0) or the back (1).
+    fn panel(&self, name: &str, placement: Placement, k: usize) -> Panel {
         let Self {
+            cut,
             half,
             cut_waist,
             neck,
@@ -42,13 +34,13 @@ impl Bodice {
             armpit,
             length,
         } = *self;
-        let (high, shoulder) = ([neck, 0.0], [tip, -SHOULDER_FALL]);
+        let (high, shoulder) = ([neck, 0.0], [tip, -cut.shoulder_fall]);
         let (underarm, waist) = ([half, armpit], [cut_waist, length]);
-        let at = cut_waist * DART_AT;
+        let (at, dart, depth) = (cut_waist * cut.dart_at, cut.dart, cut.dart_depth[k]);
         let (inner, apex, outer) = (
-            [at - DART / 2.0, length],
+            [at - dart / 2.0, length],
             [at, length + depth],
-            [at + DART / 2.0, length],
+            [at + dart / 2.0, length],
         );
         let (lower, upper) = ([tip - 0.012, armpit + 0.01], [tip - 0.024, armpit * 0.55]);
         let edges = [
@@ -62,7 +54,7 @@ impl Bodice {
                 ("waist_0", outer, Curve::Line),
                 ("side_right", waist, Curve::Line),
             ],
-            &yoke(high, shoulder, underarm, drop, [lower, upper])[..],
+            &yoke(high, shoulder, underarm, cut.drop[k], [lower, upper])[..],
             &[("side_left", flip(underarm), Curve::Line)],
         ];
         panel(name, placement, &edges.concat())
@@ -70,30 +62,36 @@ impl Bodice {
 }
 
 /// A flared dress.
-pub(super) fn flared(row: &SizeRow) -> Result<Pattern, GarmentError> {
-    let waist = (row.body.waist + EASE[1]) / 4.0; // half width of a panel once sewn
+pub(super) fn flared(row: &SizeRow, cut: &DressCut) -> Result<Pattern, GarmentError> {
+    let waist = (row.body.waist + cut.skirt.waist_ease) / 4.0; // half width of a panel once sewn
     let bodice = Bodice {
-        half: (row.body.chest + EASE[0]) / 4.0,
-        cut_waist: waist + DART,
-        neck: row.neck / 5.0 + 0.028,
-        tip: row.shoulders / 2.0 - 0.022,
-        armpit: -(row.body.chest / 8.0 + 0.098),
-        length: -(row.trunk - HIP_DEPTH + 0.01),
+        cut,
+        half: (row.body.chest + cut.chest_ease) / 4.0,
+        cut_waist: waist + cut.dart,
+        neck: row.neck / 5.0 + cut.neck,
+        tip: row.shoulders / 2.0 - cut.inset,
+        armpit: -(row.body.chest / 8.0 + cut.scye),
+        length: -(row.trunk - cut.skirt.hip_depth + cut.longer),
     };
     let skirt_waist = 2.0 * waist;
-    let half_angle = flare(skirt_waist, (row.body.hip + EASE[2]) / 2.0);
+    let half_angle = flare(
+        skirt_waist,
+        (row.body.hip + cut.skirt.hip_ease) / 2.0,
+        &cut.skirt,
+    );
     // The waist of the skirt is divided at the darts of the bodice.
-    let side = (bodice.cut_waist - (bodice.cut_waist * DART_AT + DART / 2.0)) / skirt_waist;
+    let dart = bodice.cut_waist * cut.dart_at + cut.dart / 2.0;
+    let side = (bodice.cut_waist - dart) / skirt_waist;
     let cuts = [side, 1.0 - side];
     let sector = Sector {
         waist: skirt_waist,
         half_angle,
-        length: SKIRT,
+        length: cut.skirt.length,
         cuts: &cuts,
     };
     let panels = vec![
-        bodice.panel("front", Placement::TrunkFront, DROP[0], DART_DEPTH[0]),
-        bodice.panel("back", Placement::TrunkBack, DROP[1], DART_DEPTH[1]),
+        bodice.panel("front", Placement::TrunkFront, 0),
+        bodice.panel("back", Placement::TrunkBack, 1),
         sector.panel("skirt_front", Placement::SkirtFront),
         sector.panel("skirt_back", Placement::SkirtBack),
     ];
@@ -120,6 +118,10 @@ pub(super) fn flared(row: &SizeRow) -> Result<Pattern, GarmentError> {
         }],
         material: Material::preset("cotton")?,
         layer: 1,
-        finished: [bodice.half * 4.0, waist * 4.0, sector.girth(HIP_DEPTH)],
+        finished: [
+            bodice.half * 4.0,
+            waist * 4.0,
+            sector.girth(cut.skirt.hip_depth),
+        ],
     })
 }

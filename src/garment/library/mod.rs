@@ -1,10 +1,14 @@
 //! Parametric garments of the library.
 
 mod catalogue;
+pub(crate) mod cuts;
 mod draft;
 pub(crate) mod dress;
 pub(crate) mod skirt;
 pub(crate) mod top;
 pub(crate) mod trousers;
 
-pub use catalogue::{dye, names, pattern};
+pub use catalogue::{dye, names, pattern, pattern_with};
+pub use cuts::{
+    DressCut, HoodCut, LibraryCuts, SkirtCut, SleeveCut, StraightSkirtCut, TopCut, TrousersCut,
+};

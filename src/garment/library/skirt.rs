@@ -1,30 +1,10 @@
 //! Skirts to the knee: flared (waist and hem on arcs) and straight (shaped by darts).
 
+use super::cuts::{SkirtCut, StraightSkirtCut};
 use super::draft::{DraftEdge, flip, panel, sewn};
 use crate::{
     Anchor, Curve, Dart, GarmentError, GarmentKind, Material, Panel, Pattern, Placement, SizeRow,
 };
-
-/// Ease at the waist, metres.
-const WAIST_EASE: f64 = 0.015;
-/// Ease at the hip of the flared and the straight skirt, metres.
-const HIP_EASE: [f64; 2] = [0.07, 0.045];
-/// Waist to hip line, metres.
-pub(super) const HIP_DEPTH: f64 = 0.20;
-/// Waist to hem, metres.
-const LENGTH: f64 = 0.56;
-/// Least difference of half hip and half waist of the straight skirt, metres.
-const LEAST_SHAPING: f64 = 0.012;
-/// Half hip less half hem of the straight skirt, metres.
-const HEM_TAPER: f64 = 0.012;
-/// Rise of its waist from the centre to the side, metres.
-const WAIST_RISE: f64 = 0.012;
-/// Half angle of each panel's flare, radians: both panels together make a third of a circle.
-const FLARE: f64 = 0.30;
-/// Position of the darts between the centre and the side, as a share of the half waist.
-pub(super) const DART_AT: f64 = 0.52;
-/// Depth of the darts of the straight skirt, front and back, metres.
-const DART_DEPTH: [f64; 2] = [0.095, 0.13];
 
 /// Shape of a skirt panel between two arcs about (0, radius).
 pub(super) struct Sector<'a> {
@@ -84,52 +64,52 @@ impl Sector<'_> {
 }
 
 /// Half angle of a panel whose width at the hip line is at least `hip`; widths of one panel, metres.
-pub(super) fn flare(waist: f64, hip: f64) -> f64 {
-    FLARE.max((hip - waist) / HIP_DEPTH / 2.0)
+pub(super) fn flare(waist: f64, hip: f64, cut: &SkirtCut) -> f64 {
+    cut.flare.max((hip - waist) / cut.hip_depth / 2.0)
 }
 
 /// A flared skirt.
-pub(super) fn flared(row: &SizeRow) -> Result<Pattern, GarmentError> {
-    let waist = (row.body.waist + WAIST_EASE) / 2.0;
+pub(super) fn flared(row: &SizeRow, cut: &SkirtCut) -> Result<Pattern, GarmentError> {
+    let waist = (row.body.waist + cut.waist_ease) / 2.0;
     let sector = Sector {
         waist,
-        half_angle: flare(waist, (row.body.hip + HIP_EASE[0]) / 2.0),
-        length: LENGTH,
+        half_angle: flare(waist, (row.body.hip + cut.hip_ease) / 2.0, cut),
+        length: cut.length,
         cuts: &[],
     };
     let panels = vec![
         sector.panel("front", Placement::SkirtFront),
         sector.panel("back", Placement::SkirtBack),
     ];
-    let finished = [0.0, waist * 2.0, sector.girth(HIP_DEPTH)];
+    let finished = [0.0, waist * 2.0, sector.girth(cut.hip_depth)];
     finish(row, "skirt", panels, &["waist"], finished)
 }
 
 /// A straight skirt.
-pub(super) fn straight(row: &SizeRow) -> Result<Pattern, GarmentError> {
-    let waist = (row.body.waist + WAIST_EASE) / 4.0; // half width of a panel
-    let hip = (row.body.hip + HIP_EASE[1]) / 4.0;
+pub(super) fn straight(row: &SizeRow, cut: &StraightSkirtCut) -> Result<Pattern, GarmentError> {
+    let waist = (row.body.waist + cut.waist_ease) / 4.0; // half width of a panel
+    let hip = (row.body.hip + cut.hip_ease) / 4.0;
     // The hip exceeds the waist by a dart on each side, and by as much at the side seam.
-    let more = (hip - waist).max(LEAST_SHAPING);
+    let more = (hip - waist).max(cut.least_shaping);
     let (dart, top) = (0.5 * more, waist + 0.5 * more);
-    let (hem, rise) = (hip - HEM_TAPER, WAIST_RISE);
+    let (hem, rise, hip_depth) = (hip - cut.hem_taper, cut.waist_rise, cut.hip_depth);
     let build = |name: &str, placement, depth: f64| {
-        let at = top * DART_AT;
+        let at = top * cut.dart_at;
         let line = |x: f64| rise * x / top;
         let (out, apex, inn) = (
             [at + dart / 2.0, line(at + dart / 2.0)],
             [at, -depth],
             [at - dart / 2.0, line(at - dart / 2.0)],
         );
-        let (corner, hips, low) = ([top, rise], [hip, -HIP_DEPTH], [hem, -LENGTH]);
+        let (corner, hips, low) = ([top, rise], [hip, -hip_depth], [hem, -cut.length]);
         // The hip curve leaves the hip line upright.
         let curve = Curve::Cubic(
-            [hip, -HIP_DEPTH * 0.55],
-            [top + (hip - top) * 0.55, -HIP_DEPTH * 0.18],
+            [hip, -hip_depth * 0.55],
+            [top + (hip - top) * 0.55, -hip_depth * 0.18],
         );
         let back = Curve::Cubic(
-            [-top - (hip - top) * 0.55, -HIP_DEPTH * 0.18],
-            [-hip, -HIP_DEPTH * 0.55],
+            [-top - (hip - top) * 0.55, -hip_depth * 0.18],
+            [-hip, -hip_depth * 0.55],
         );
         panel(
             name,
@@ -151,8 +131,8 @@ pub(super) fn straight(row: &SizeRow) -> Result<Pattern, GarmentError> {
         )
     };
     let panels = vec![
-        build("front", Placement::SkirtFront, DART_DEPTH[0]),
-        build("back", Placement::SkirtBack, DART_DEPTH[1]),
+        build("front", Placement::SkirtFront, cut.dart_depth[0]),
+        build("back", Placement::SkirtBack, cut.dart_depth[1]),
     ];
     let pattern = finish(
         row,

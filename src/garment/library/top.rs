@@ -1,115 +1,16 @@
 //! Tops: T-shirt, long-sleeved shirt, tank top, hooded top.
 
+use super::cuts::{HoodCut, SleeveCut, TopCut};
 use super::draft::{DraftEdge, flip, mirrored, panel, sewn};
 use crate::{
     Anchor, Curve, GarmentError, GarmentKind, Material, Panel, Pattern, Placement, Seam, Side,
     SizeRow,
 };
 
-/// Fall of the shoulder seam from neck to tip, metres.
-pub(super) const SHOULDER_FALL: f64 = 0.045;
-
 /// Length of a sleeve cap over that of the armhole.
 const CAP_EASE: f64 = 1.02;
 /// Iterations for the height of a sleeve cap.
 const CAP_ITERATIONS: usize = 40;
-
-/// Parameters of a top, metres.
-struct Cut {
-    name: &'static str,
-    fabric: &'static str,
-    /// Ease at chest and hip.
-    ease: [f64; 2],
-    /// Half width of the neck opening beyond a fifth of the neck girth (drafting rule of Aldrich 2015).
-    neck: f64,
-    /// Drop of the front and back neckline below the high point of the shoulder.
-    drop: [f64; 2],
-    /// Width of the shoulder seam; zero for a seam to the shoulder tip.
-    strap: f64,
-    /// Scye depth beyond an eighth of the chest.
-    scye: f64,
-    /// Length below the hip line.
-    longer: f64,
-    sleeve: Option<SleeveCut>,
-    hood: bool,
-}
-
-/// Parameters of a sleeve.
-struct SleeveCut {
-    /// Ease over the upper arm, metres.
-    ease: f64,
-    /// Length from the shoulder tip, metres; `None` for a sleeve to the wrist.
-    length: Option<f64>,
-    /// Width at the cuff over width at the underarm; long sleeves wider than half slide to the elbow.
-    cuff: f64,
-}
-
-const TSHIRT: Cut = Cut {
-    name: "tshirt",
-    fabric: "jersey",
-    ease: [0.10, 0.08], // a regular-fit T-shirt has 8 to 12 cm at the chest
-    neck: 0.012,
-    drop: [0.085, 0.022],
-    strap: 0.0,
-    scye: 0.105,
-    longer: 0.045,
-    sleeve: Some(SleeveCut {
-        ease: 0.085,
-        length: Some(0.215),
-        cuff: 0.93,
-    }),
-    hood: false,
-};
-const LONGSLEEVE: Cut = Cut {
-    name: "longsleeve",
-    fabric: "cotton",
-    sleeve: Some(SleeveCut {
-        ease: 0.085,
-        length: None,
-        cuff: 0.50,
-    }),
-    ..TSHIRT
-};
-const TANK: Cut = Cut {
-    name: "tank",
-    ease: [0.05, 0.04],
-    neck: 0.035,
-    drop: [0.125, 0.065],
-    strap: 0.052,
-    scye: 0.105,
-    longer: 0.03,
-    sleeve: None,
-    ..TSHIRT
-};
-const HOODIE: Cut = Cut {
-    name: "hoodie",
-    fabric: "fleece",
-    ease: [0.16, 0.09],
-    neck: 0.020,
-    drop: [0.085, 0.020],
-    scye: 0.125,
-    longer: 0.04,
-    sleeve: Some(SleeveCut {
-        ease: 0.12,
-        length: None,
-        cuff: 0.50,
-    }),
-    hood: true,
-    ..TSHIRT
-};
-
-pub(super) fn tshirt(row: &SizeRow) -> Result<Pattern, GarmentError> {
-    draw(row, &TSHIRT)
-}
-pub(super) fn longsleeve(row: &SizeRow) -> Result<Pattern, GarmentError> {
-    draw(row, &LONGSLEEVE)
-}
-pub(super) fn tank(row: &SizeRow) -> Result<Pattern, GarmentError> {
-    draw(row, &TANK)
-}
-pub(super) fn hoodie(row: &SizeRow) -> Result<Pattern, GarmentError> {
-    draw(row, &HOODIE)
-}
 
 /// Edges of a panel above the armpits, from paper right to left: armholes, shoulders and a neckline `drop` metres deep.
 /// Points are those of the right side, the last pair the control points of the armhole.
@@ -144,7 +45,13 @@ pub(super) fn yoke(
     ]
 }
 
-fn draw(row: &SizeRow, cut: &Cut) -> Result<Pattern, GarmentError> {
+/// A top of this fabric.
+pub(super) fn draft(
+    row: &SizeRow,
+    name: &str,
+    fabric: &str,
+    cut: &TopCut,
+) -> Result<Pattern, GarmentError> {
     let half = (row.body.chest + cut.ease[0]) / 4.0; // half width of the front panel
     let hem = (row.body.hip.max(row.body.chest) + cut.ease[1]) / 4.0;
     let neck = row.neck / 5.0 + cut.neck;
@@ -153,7 +60,7 @@ fn draw(row: &SizeRow, cut: &Cut) -> Result<Pattern, GarmentError> {
     } else {
         row.shoulders / 2.0 + 0.005
     };
-    let fall = SHOULDER_FALL * ((tip - neck) / (row.shoulders / 2.0 - row.neck / 5.0)).min(1.0);
+    let fall = cut.shoulder_fall * ((tip - neck) / (row.shoulders / 2.0 - row.neck / 5.0)).min(1.0);
     let armpit = -(row.body.chest / 8.0 + cut.scye);
     let length = -(row.trunk + cut.longer);
     let body = |name: &str, placement, drop: f64| {
@@ -183,18 +90,18 @@ fn draw(row: &SizeRow, cut: &Cut) -> Result<Pattern, GarmentError> {
     if let Some(s) = &cut.sleeve {
         sleeves(row, s, &mut panels, &mut seams);
     }
-    if cut.hood {
-        hood(&mut panels, &mut seams);
+    if let Some(h) = &cut.hood {
+        hood(h, &mut panels, &mut seams);
     }
     Ok(Pattern {
-        name: cut.name.into(),
+        name: name.into(),
         kind: GarmentKind::Top,
         size: row.size,
         panels,
         seams,
         darts: vec![],
         anchors: vec![shoulders()],
-        material: Material::preset(cut.fabric)?,
+        material: Material::preset(fabric)?,
         layer: 1,
         finished: [half * 4.0, 0.0, hem * 4.0],
     })
@@ -282,13 +189,8 @@ fn sleeves(row: &SizeRow, cut: &SleeveCut, panels: &mut Vec<Panel>, seams: &mut 
     ]);
 }
 
-/// Height of a hood from the neckline to its top, metres: head height and clearance.
-const HOOD_HEIGHT: f64 = 0.355;
-/// Depth of a hood at its widest, metres.
-const HOOD_DEPTH: f64 = 0.245;
-
 /// Adds the two halves of a hood, sewn along the crown and to the neckline.
-fn hood(panels: &mut Vec<Panel>, seams: &mut Vec<Seam>) {
+fn hood(cut: &HoodCut, panels: &mut Vec<Panel>, seams: &mut Vec<Seam>) {
     let (b, f) = (
         length_of(&panels[1], "neck_right"),
         length_of(&panels[0], "neck_right"),
@@ -308,10 +210,10 @@ fn hood(panels: &mut Vec<Panel>, seams: &mut Vec<Seam>) {
             ),
             (
                 "crown",
-                [HOOD_DEPTH * 0.98, HOOD_HEIGHT],
+                [cut.depth * 0.98, cut.height],
                 Curve::Cubic(
-                    [HOOD_DEPTH * 0.30, HOOD_HEIGHT * 1.08],
-                    [-0.14, HOOD_HEIGHT * 0.62],
+                    [cut.depth * 0.30, cut.height * 1.08],
+                    [-0.14, cut.height * 0.62],
                 ),
             ),
         ],

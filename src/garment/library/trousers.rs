@@ -1,30 +1,10 @@
 //! Straight trousers and shorts: two fronts, two backs.
 
+use super::cuts::TrousersCut;
 use super::draft::{mirrored, panel, sewn};
 use crate::{
     Anchor, Curve, GarmentError, GarmentKind, Material, Panel, Pattern, Placement, Side, SizeRow,
 };
-
-/// Ease at the waist, metres.
-const WAIST_EASE: f64 = 0.02;
-/// Ease at the hip, metres.
-const HIP_EASE: f64 = 0.055;
-/// Height of the body's crotch above that of the garment, metres.
-const RISE_EASE: f64 = 0.015;
-/// Extension of the crotch beyond the centre line, as a share of the hip: front and back.
-const CROTCH: [f64; 2] = [0.045, 0.085];
-
-/// Inseam of shorts, metres.
-const SHORT: f64 = 0.20;
-
-/// Straight trousers.
-pub(super) fn long(row: &SizeRow) -> Result<Pattern, GarmentError> {
-    draft(row, "trousers", "denim", row.inseam, 0.64)
-}
-/// Shorts.
-pub(super) fn shorts(row: &SizeRow) -> Result<Pattern, GarmentError> {
-    draft(row, "shorts", "twill", SHORT, 0.96)
-}
 
 /// Measures of a leg, metres. A panel has x = 0 at the centre line of the body.
 struct LegCut {
@@ -71,23 +51,23 @@ impl LegCut {
     }
 }
 
-fn draft(
+/// Trousers or shorts of this fabric.
+pub(super) fn draft(
     row: &SizeRow,
     name: &str,
     fabric: &str,
-    inseam: f64,
-    taper: f64,
+    cut: &TrousersCut,
 ) -> Result<Pattern, GarmentError> {
-    let rise = -(row.rise + RISE_EASE);
+    let rise = -(row.rise + cut.rise_ease);
     let leg = LegCut {
-        hip: (row.body.hip + HIP_EASE) / 4.0,
-        waist: (row.body.waist + WAIST_EASE) / 4.0,
+        hip: (row.body.hip + cut.hip_ease) / 4.0,
+        waist: (row.body.waist + cut.waist_ease) / 4.0,
         rise,
         hip_line: rise * 0.68,
-        hem: rise - inseam,
-        taper,
+        hem: rise - cut.inseam.unwrap_or(row.inseam),
+        taper: cut.taper,
     };
-    let crotch = CROTCH.map(|share| share * row.body.hip);
+    let crotch = cut.crotch.map(|share| share * row.body.hip);
     let front = Placement::LegFront;
     let fl = leg.panel("front_left", front(Side::Left), crotch[0]);
     let fr = mirrored(&fl, "front_right", front(Side::Right));

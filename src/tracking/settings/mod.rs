@@ -27,23 +27,4 @@ pub use start::{HypothesisSettings, ProposalSettings, StartSettings};
 pub use step::{ChangeSettings, StepSettings};
 pub use tracker::TrackerConfig;
 
-/// Defines settings structs whose fields carry their documentation and default.
-macro_rules! settings {
-    ($($(#[$doc:meta])* pub struct $name:ident {
-        $($(#[$field_doc:meta])* pub $field:ident: $type:ty = $default:expr,)*
-    })*) => {$(
-        $(#[$doc])*
-        #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
-        #[serde(default, deny_unknown_fields)]
-        pub struct $name {
-            $($(#[$field_doc])* pub $field: $type,)*
-        }
-
-        impl Default for $name {
-            fn default() -> Self {
-                Self { $($field: $default,)* }
-            }
-        }
-    )*};
-}
-use settings;
+use tryon_geometry::settings;

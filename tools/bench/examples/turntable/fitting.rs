@@ -9,7 +9,7 @@ use tryon::body::Pose;
 use tryon::body::measure::measure;
 use tryon::cloth::{Config, Input, State, StepReport, Workspace, step};
 use tryon::dressing::{
-    DressError, DressOptions, Dressed, FitMap, FitProbe, GarmentSource, dress_all,
+    DressError, DressOptions, Dressed, FitMap, FitMapSettings, FitProbe, GarmentSource, dress_all,
 };
 use tryon::garment::{GarmentMesh, library};
 use tryon::geometry::math::{P3, World};
@@ -182,7 +182,8 @@ impl Fitting {
                 Some(crossing_colors(g, positions))
             } else {
                 fits.as_ref().map(|maps| {
-                    let colors = maps[k].vertices.iter().map(|v| v.color());
+                    let limits = FitMapSettings::default();
+                    let colors = maps[k].vertices.iter().map(|v| v.color(&limits));
                     colors.collect()
                 })
             };

@@ -3,7 +3,7 @@
 use crate::args::Args;
 use std::path::Path;
 use tryon::body::measure::Measurements;
-use tryon::dressing::{GarmentSource, MeshGarment, suggest};
+use tryon::dressing::{GarmentSource, MeshGarment, MeshGarmentSettings, suggest};
 use tryon::garment::{Pattern, Triangulation, library};
 
 /// A garment to put on.
@@ -28,7 +28,9 @@ impl Garment {
         if [".obj", ".glb", ".gltf", ".mhclo"].iter().any(is_mesh) {
             let fabric = tryon::garment::Material::preset("cotton").expect("preset");
             let edge = a.edge.unwrap_or(Triangulation::default().edge_length);
-            let mesh = MeshGarment::read_on(Path::new(name), a.garment_body.clone(), &fabric, edge);
+            let settings = MeshGarmentSettings::with_edge(edge);
+            let body = a.garment_body.clone();
+            let mesh = MeshGarment::read_on(Path::new(name), body, &fabric, &settings);
             let mesh = mesh.expect("a garment");
             mesh.notes.iter().for_each(|n| println!("  {n}"));
             return Self::Mesh(Box::new(mesh));

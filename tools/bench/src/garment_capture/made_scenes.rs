@@ -8,7 +8,7 @@ use crate::scans::{
 use crate::scenes::subject;
 use std::path::{Path, PathBuf};
 use tryon::mirror::Choice;
-use tryon_dressing::MeshGarment;
+use tryon_dressing::{MeshGarment, MeshGarmentSettings};
 use tryon_formats::read_motion;
 use tryon_garment::Material;
 use tryon_synth::Actor;
@@ -273,7 +273,9 @@ impl MadeSpec {
         let cotton = Material::preset("cotton").map_err(|e| e.to_string())?;
         let base = data.join(BASE);
         let garment = |(layer, (name, _)): (u8, &(&str, GarmentParts))| {
-            let mesh = MeshGarment::read(&clothes_file(data, name), Some(&base), &cotton, EDGE);
+            let settings = MeshGarmentSettings::with_edge(EDGE);
+            let file = clothes_file(data, name);
+            let mesh = MeshGarment::read(&file, Some(&base), &cotton, &settings);
             let mesh = mesh.map_err(|e| format!("{name}: {e}"))?;
             Ok(Choice::mesh(mesh.in_layer(layer), None).into())
         };

@@ -3,7 +3,7 @@ use crate::people::unlike_actors;
 use std::sync::OnceLock;
 use tryon::mirror::Choice;
 use tryon_body::embedded;
-use tryon_dressing::MeshGarment;
+use tryon_dressing::{MeshGarment, MeshGarmentSettings};
 use tryon_formats::scan::{read_scan, scan_files};
 use tryon_formats::shared_data;
 use tryon_garment::Material;
@@ -221,7 +221,9 @@ fn clothes_by_others_are_worn_on_bodies_by_others() {
         return;
     }
     let cotton = Material::preset("cotton").expect("a preset");
-    let mesh = MeshGarment::read(&data.join(suit), Some(&base), &cotton, 0.03).expect("a suit");
+    let settings = MeshGarmentSettings::with_edge(0.03);
+    let mesh = MeshGarment::read(&data.join(suit), Some(&base), &cotton, &settings);
+    let mesh = mesh.expect("a suit");
     let actors = unlike_actors(&data).expect("bodies");
     assert!(actors.iter().all(|(name, _)| name != "wide_coat"));
     let (_, actor) = (actors.into_iter().find(|(name, _)| name == "muscular")).expect("a body");

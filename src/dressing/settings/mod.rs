@@ -1,0 +1,40 @@
+//! Settings of dressing: one struct a stage, each field with its documentation and default side by side.
+
+mod drape;
+mod fit;
+mod mesh_garment;
+mod place;
+mod sections;
+
+pub use drape::{
+    DrapeContactSettings, DrapeSettings, FollowSettings, HeldDownSettings, HoodDrapeSettings,
+    ScheduleSettings, UntangleSettings,
+};
+pub use fit::{FitMapSettings, SizeSettings};
+pub use mesh_garment::{
+    AnchorSettings, ClassifierSettings, GuessSettings, LiftSettings, MeshGarmentSettings,
+    PieceSettings, RetargetSettings, SurfaceSettings,
+};
+pub use place::{
+    HoodPlaceSettings, LegPlaceSettings, PlaceSettings, SewSettings, SkirtPlaceSettings,
+    TrunkPlaceSettings, TubeSettings,
+};
+pub use sections::{CanonicalSettings, SectionSettings};
+
+use tryon_geometry::settings;
+
+settings! {
+    /// Settings of the stages of dressing.
+    pub struct StageSettings {
+        /// Canonical pose and cross-sections of the body.
+        pub sections: SectionSettings = SectionSettings::default(),
+        /// Sewing.
+        pub sew: SewSettings = SewSettings::default(),
+        /// Placement of panels.
+        pub place: PlaceSettings = PlaceSettings::default(),
+        /// Drape.
+        pub drape: DrapeSettings = DrapeSettings::default(),
+        /// Sizes that patterns are worn in.
+        pub size: SizeSettings = SizeSettings::default(),
+    }
+}

@@ -1,0 +1,83 @@
+//! Settings of sewing, and of the placement of panels around the canonical body.
+
+use super::settings;
+
+settings! {
+    /// Settings of sewing.
+    pub struct SewSettings {
+        /// Edge length of the mesh that is draped first over that of the garment: four times fewer vertices.
+        pub coarser: f64 = 2.0,
+        /// The same for hoods; from shorter edges worn hoods intersect themselves more (docs/benchmarks.md).
+        pub hood_coarser: f64 = 2.2,
+        /// Longest edge of the mesh that is draped first, metres: longer ones lose sleeves.
+        pub coarsest: f64 = 0.045,
+    }
+
+    /// Settings of the placement.
+    pub struct PlaceSettings {
+        /// Tubes around the body.
+        pub tube: TubeSettings = TubeSettings::default(),
+        /// Clearance of the shoulder seam over the skin, metres: less sinks in where the shoulder is hollow.
+        pub seam_clearance: f32 = 0.008,
+        /// Length of arm at the armhole that is measured farther out, metres: the skin is open there.
+        pub armhole: f32 = 0.07,
+        /// Trunk.
+        pub trunk: TrunkPlaceSettings = TrunkPlaceSettings::default(),
+        /// Legs.
+        pub leg: LegPlaceSettings = LegPlaceSettings::default(),
+        /// Skirts and waistbands.
+        pub skirt: SkirtPlaceSettings = SkirtPlaceSettings::default(),
+        /// Hoods.
+        pub hood: HoodPlaceSettings = HoodPlaceSettings::default(),
+    }
+
+    /// Settings of tubes around the body.
+    pub struct TubeSettings {
+        /// Clearance between body and cloth at the start, metres: less starts inside the skin, more falls farther.
+        pub clearance: f32 = 0.015,
+        /// Largest factor by which a wide garment widens the body's ellipse; a tent is draped from there.
+        pub widest: f32 = 1.6,
+    }
+
+    /// Settings of the trunk's panels.
+    pub struct TrunkPlaceSettings {
+        /// Depth over which a shirt turns over the shoulder, metres: less makes a sharp crease there.
+        pub shoulder_depth: f32 = 0.10,
+        /// Distance below the armpit from which rows go around the legs too, metres: a long top over the hips.
+        pub lower_body: f32 = 0.05,
+        /// Least distance of an underarm point outside and below the shoulder tip, metres.
+        pub underarm: [f64; 2] = [0.01, 0.05],
+    }
+
+    /// Settings of trouser panels.
+    pub struct LegPlaceSettings {
+        /// Least distance of a trouser leg from the sagittal plane, metres: closer, the legs start in each other.
+        pub inseam_gap: f32 = 0.001,
+        /// Highest section of one leg alone, metres below the crotch. Less cuts the other thigh too.
+        pub top: f32 = 0.04,
+    }
+
+    /// Settings of skirts and waistbands.
+    pub struct SkirtPlaceSettings {
+        /// Share of its length over which a skirt starts: it settles downwards.
+        pub shortened: f32 = 0.97,
+        /// Least height of a waistband above the hip, metres: lower it slides off.
+        pub above_hip: f32 = 0.05,
+    }
+
+    /// Settings of hoods, laid back.
+    pub struct HoodPlaceSettings {
+        /// Angle by which a hood lies back, radians; with less its back turns inside out.
+        pub recline: f32 = 2.5,
+        /// Height of cloth over which it folds back, metres.
+        pub fold: f32 = 0.25,
+        /// Height of the fold's axis above the nape, metres; below the nape the back would turn inside out.
+        pub axis: f32 = 0.03,
+        /// Width of cloth over which a hood turns from the crown to the side of the head, metres.
+        pub crown_turn: f32 = 0.11,
+        /// Height above the shoulder line from which skin is head, metres.
+        pub head: f32 = 0.10,
+        /// Height of the nape above the shoulder line, metres.
+        pub nape: f32 = 0.01,
+    }
+}
