@@ -1,53 +1,13 @@
 //! Sewn garment: one welded simulation mesh whose triangles keep their flat rest shape.
 
-use super::triangulate::{PanelMesh, triangulate};
+use super::triangulate::{PanelMesh, Triangulation, triangulate};
 use super::{Anchor, GarmentError, GarmentKind, Material, Panel, Pattern, Placement, Side, Size};
 use serde::{Deserialize, Serialize};
 use tryon_geometry::math::P3;
 use tryon_geometry::mesh::{Face, Topology, TriMesh, UnionFind};
-use tryon_geometry::settings;
 
 /// Gap between panels in texture space, metres.
 const TEXTURE_GAP: f64 = 0.02;
-
-settings! {
-    /// Settings of the triangulation. 21 mm gives a T-shirt or a skirt about 2,000 vertices; the panels of the library stay
-    /// above 20°.
-    pub struct Triangulation {
-        /// Target edge length, metres.
-        pub edge_length: f64 = 0.021,
-        /// Longest edges of a hood, metres: longer ones do not resolve the folds of a hood worn down.
-        pub hood_length: f64 = 0.014,
-        /// Smallest angle of a panel, degrees; a panel with a smaller one is refused.
-        pub min_angle: f64 = 12.0,
-        /// Least distance of lattice points from the outline, edge lengths: with 0.55 the triangles along the edge stay between a
-        /// slim and a flat one.
-        pub clearance: f64 = 0.58,
-        /// Iterations of Laplacian smoothing of inner points. Fewer leave slim triangles.
-        pub smoothing: usize = 4,
-    }
-}
-
-impl Triangulation {
-    /// Shortest and longest edge length, metres.
-    const LENGTHS: [f64; 2] = [0.001, 0.5];
-
-    fn check(&self) -> Result<(), GarmentError> {
-        let [least, most] = Self::LENGTHS;
-        for (field, length) in [
-            ("edge_length", self.edge_length),
-            ("hood_length", self.hood_length),
-        ] {
-            if !(length > least && length < most) {
-                return Err(GarmentError::Field {
-                    field: field.into(),
-                    why: format!("{length} m is not between {least} and {most}"),
-                });
-            }
-        }
-        Ok(())
-    }
-}
 
 /// Set of body parts that a vertex touches, as bits.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
