@@ -7,7 +7,7 @@ settings! {
     pub struct SewSettings {
         /// Edge length of the mesh that is draped first over that of the garment: four times fewer vertices.
         pub coarser: f64 = 2.0,
-        /// The same for hoods; from shorter edges worn hoods intersect themselves more (docs/benchmarks.md).
+        /// The same for hoods; from shorter edges worn hoods intersect themselves more (decision 021).
         pub hood_coarser: f64 = 2.2,
         /// Longest edge of the mesh that is draped first, metres: longer ones lose sleeves.
         pub coarsest: f64 = 0.045,

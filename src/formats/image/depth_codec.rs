@@ -2,7 +2,7 @@
 //!
 //! Layout, little-endian: magic `TDZ1`, width u32, height u32, one zstd frame of `2 · width · height` bytes: all low
 //! bytes, then all high bytes of the zigzag-coded difference of each pixel to its left neighbour (0 before a row).
-//! Smaller and faster than plain zstd and than RVL (docs/benchmarks).
+//! Smaller and faster than plain zstd and than RVL (decision 070).
 
 use super::limits::check_size;
 use crate::FormatError;

@@ -25,7 +25,7 @@ pub enum Label {
 }
 
 /// A focal length of this many cells keeps about 1,500 cells on a person who fills the height of the image; twice as
-/// many changed the joint error by less than 0.3 mm and doubled the time (docs/benchmarks).
+/// many changed the joint error by less than 0.3 mm and doubled the time (docs/benchmarks/tracking.md).
 const CELLS_PER_FOCAL_LENGTH: f64 = 131.25;
 
 /// Readings of one cell belong together when they are within this distance (metres) plus [`SAME_SURFACE_SLOPE`] × z.

@@ -105,7 +105,7 @@ pub fn cloth(
 ) -> Result<Table, EvaluateError> {
     let mut table = Table {
         name: "cloth".into(),
-        command: "evaluate::cloth::cloth".into(),
+        command: "tryon-bench cloth".into(),
         run_time: "milliseconds for 1/60 s of cloth, median over the scene".into(),
         rows: Vec::new(),
     };

@@ -94,7 +94,7 @@ pub fn cloth_offline(
     mut progress: impl FnMut(&Row),
 ) -> Result<Table, EvaluateError> {
     let run_time = "milliseconds for 1/60 s of cloth, median over the scene";
-    let mut table = Table::new("cloth-offline", "evaluate::cloth_offline", run_time);
+    let mut table = Table::new("cloth-offline", "tryon-bench cloth --offline", run_time);
     for scene_name in &bench.scenes {
         let fault = |why: String| EvaluateError::Scene {
             scene: scene_name.clone(),

@@ -194,7 +194,7 @@ pub fn dress_offline(
     mut progress: impl FnMut(&Row),
 ) -> Result<Table, EvaluateError> {
     let run_time = "milliseconds for a drape, and for 1/30 s of dance";
-    let mut table = Table::new("dress-offline", "evaluate::dress_offline", run_time);
+    let mut table = Table::new("dress-offline", "tryon-bench cloth --offline", run_time);
     let scene = DressScene::load(folder, bench.vertices)?;
     scene.run(&bench, Par::Rayon, |row| {
         progress(&row);
