@@ -133,9 +133,7 @@ impl<'a> GuessFit<'a> {
     }
     /// Mean distance of the cloth from its height over the skin, plus the prior, metres.
     fn cost(&self, q: &Guess) -> f32 {
-        let &GuessSettings {
-            far, inside, above, ..
-        } = self.settings;
+        let (far, inside, above) = (self.settings.far, self.settings.inside, self.settings.above);
         let (vertices, _) = self.stand(q);
         let skin = SkinSearch::new(self.template, &vertices, 0.0);
         let shift = V3::new(0.0, q[2] as f32, q[3] as f32);
@@ -156,25 +154,15 @@ impl<'a> GuessFit<'a> {
         let floor = q[2]
             .abs()
             .min((q[2] - q[0] * f64::from(self.stature) / 2.0).abs());
-        let GuessSettings {
-            stature_spread,
-            floor_spread,
-            ..
-        } = self.settings;
-        let prior = ((q[0] - 1.0) / stature_spread).powi(2) + (floor / floor_spread).powi(2);
+        let s = self.settings;
+        let prior = ((q[0] - 1.0) / s.stature_spread).powi(2) + (floor / s.floor_spread).powi(2);
         sum / self.points.len().max(1) as f32 + self.settings.prior * prior as f32
     }
     /// Coordinate descent with halved steps: least cost and its guess.
     fn minimise(&self) -> (f32, Guess) {
-        let &GuessSettings {
-            start,
-            scales,
-            arms,
-            steps,
-            halvings,
-            ..
-        } = self.settings;
-        let at = |up: f64| -> Guess { [start[0], start[1], up, 0.0] };
+        let settings = self.settings;
+        let [scale, arms] = settings.start;
+        let at = |up: f64| -> Guess { [scale, arms, up, 0.0] };
         let starts = [at(f64::from(self.stature) / 2.0), at(0.0)];
         let count = if self.lowest < self.settings.underground {
             1
@@ -186,15 +174,15 @@ impl<'a> GuessFit<'a> {
             .map(|s| (self.cost(s), *s))
             .min_by(|a, b| a.0.total_cmp(&b.0))
             .unwrap_or_default();
-        let mut step = steps;
-        for _ in 0..halvings {
+        let mut step = settings.steps;
+        for _ in 0..settings.halvings {
             for k in if self.free { 0..4 } else { 2..4 } {
                 for sign in [-1.0, 1.0] {
                     loop {
                         let mut q = best.1;
                         q[k] += sign * step[k];
                         let within = |k: usize, [low, high]: [f64; 2]| (low..high).contains(&q[k]);
-                        let inside = within(0, scales) && within(1, arms);
+                        let inside = within(0, settings.scales) && within(1, settings.arms);
                         let c = if inside { self.cost(&q) } else { f32::MAX };
                         if c >= best.0 {
                             break;

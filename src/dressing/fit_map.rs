@@ -420,6 +420,7 @@ mod tests {
             surface: &surface,
             frame: &frame,
             offset: 0.005,
+            settings: &FitMapSettings::default(),
         }
         .vertex_fits(&mut Vec::new())
     }

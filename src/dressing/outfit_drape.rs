@@ -5,7 +5,7 @@ use super::drape::{Drape, Layers};
 use super::error::DressError;
 use super::options::{DressOptions, DressReport, ms};
 use super::refine::prolong;
-use super::settings::{CanonicalSettings, DrapeSettings, ScheduleSettings};
+use super::settings::{CanonicalSettings, DrapeSettings};
 use super::sew::PlacedSheet;
 use super::skin::{Skin, SkinModel};
 use super::waistband::GarmentOnSkin;
@@ -173,11 +173,7 @@ impl<'a> OutfitDrape<'a> {
     }
     /// Follows the body through its poses.
     fn follow(&mut self, bodies: &[Vec<P3>], substeps: usize) -> Result<(), ClothError> {
-        let ScheduleSettings {
-            coarse_step,
-            clearing,
-            ..
-        } = self.settings.schedule;
+        let schedule = self.settings.schedule;
         for w in bodies.windows(2) {
             self.skin.place(&w[1])?;
             let (skin, anchors) = (&self.skin, &self.anchors);
@@ -185,29 +181,23 @@ impl<'a> OutfitDrape<'a> {
                 d.follow_skin(&w[0], &w[1]);
                 d.recover_sleeves(skin);
                 d.pin(&anchors[k], skin.frame());
-                d.run(on, substeps, coarse_step, 1.0);
-                d.untangle_at_rest(on, clearing);
+                d.run(on, substeps, schedule.coarse_step, 1.0);
+                d.untangle_at_rest(on, schedule.clearing);
             });
         }
         Ok(())
     }
     /// Settles in the tracked pose and refines, again while the fine garments intersect themselves off the arms.
     fn finish(&mut self, report: &mut DressReport) -> Result<Layers, DressError> {
-        let ScheduleSettings {
-            attempts,
-            settling,
-            coarse_step,
-            cleared,
-            ..
-        } = self.settings.schedule;
+        let schedule = self.settings.schedule;
         let mut fine = Layers::default();
-        for _ in 0..attempts {
+        for _ in 0..schedule.attempts {
             let timer = Instant::now();
             let skin = &self.skin;
             self.layers.each(skin, &self.offsets, |_, d, on| {
                 d.recover_sleeves(skin);
-                d.run(on, settling, coarse_step, 1.0);
-                d.untangle_at_rest(on, cleared);
+                d.run(on, schedule.settling, schedule.coarse_step, 1.0);
+                d.untangle_at_rest(on, schedule.cleared);
             });
             report.stages_ms.coarse += ms(timer);
             let timer = Instant::now();
@@ -258,12 +248,8 @@ impl<'a> OutfitDrape<'a> {
                 d
             });
         }
-        let ScheduleSettings {
-            fine_step,
-            finishing,
-            cleared,
-            ..
-        } = self.settings.schedule;
+        let s = self.settings.schedule;
+        let (fine_step, finishing, cleared) = (s.fine_step, s.finishing, s.cleared);
         let mut fine = Layers::new(&self.garments, drapes)?;
         fine.each(&self.skin, &self.offsets, |_, d, on| {
             d.recover_sleeves(&self.skin);

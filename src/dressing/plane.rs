@@ -26,12 +26,7 @@ impl DrapePlane {
         room: f64,
         settings: &DrapeContactSettings,
     ) -> bool {
-        let &DrapeContactSettings {
-            facing,
-            halved,
-            half_gap,
-            ..
-        } = settings;
+        let (facing, halved, half_gap) = (settings.facing, settings.halved, settings.half_gap);
         let away = other.normal - self.normal;
         let steep = away.norm();
         let faces = steep > facing && far[0] < halved && far[1] < 2.0 * halved;

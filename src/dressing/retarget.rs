@@ -120,12 +120,8 @@ impl<'a> TargetSkin<'a> {
     /// Displacement from `p` to the target skin along its normal; `None` without a counterpart in the same part.
     fn gap(&self, part: u8, p: &P3, normal: &V3) -> Option<V3d> {
         let (_, own, tree) = self.parts.iter().find(|(r, ..)| part & r.0 != 0)?;
-        let &RetargetSettings {
-            reach,
-            same_side,
-            offset,
-            ..
-        } = self.settings;
+        let s = self.settings;
+        let (reach, same_side, offset) = (s.reach, s.same_side, s.offset);
         let (k, _) = tree.nearest(&(p + normal * offset), reach)?;
         let (q, m) = (self.vertices[own[k]], self.normals[own[k]]);
         // Across the skin only: along it the bone maps are more exact.

@@ -6,7 +6,6 @@ use super::finished::FinishedGarment;
 use super::mesh_garment::MeshGarment;
 use super::options::DressOptions;
 use super::place::{PlacedBody, place};
-use super::settings::SewSettings;
 use super::suggest::check_wearable;
 use tryon_body::Template;
 use tryon_body::measure::Measurements;
@@ -106,11 +105,8 @@ impl Sewing<'_> {
         };
         self.check(&in_settings(FinishedGarment::from(pattern)), of_size)?;
         let (fine, stages) = (&self.options.triangulation, &self.options.stages);
-        let SewSettings {
-            coarser,
-            hood_coarser,
-            coarsest,
-        } = stages.sew;
+        let s = stages.sew;
+        let (coarser, hood_coarser, coarsest) = (s.coarser, s.hood_coarser, s.coarsest);
         // Slim triangles are allowed: nothing is simulated on this mesh later.
         let coarse = GarmentMesh::sew(
             pattern,

@@ -3,7 +3,6 @@
 use super::context::{DrapeContext, OuterGarment};
 use super::state::Drape;
 use crate::plane::DrapePlane;
-use crate::settings::DrapeContactSettings;
 use crate::skin::Skin;
 use tryon_cloth::contact::{ClosestPoint, Part};
 use tryon_garment::Region;
@@ -153,9 +152,7 @@ impl Drape {
     }
     /// Moves a vertex above a plane; returns the distance (m).
     fn project_out(&mut self, i: usize, p: &DrapePlane, sunk: f64) -> f64 {
-        let DrapeContactSettings {
-            plane_size, lift, ..
-        } = self.settings.contact;
+        let (plane_size, lift) = (self.settings.contact.plane_size, self.settings.contact.lift);
         let d = self.x[i] - p.point;
         let slack = self.slack[i];
         let allowed = if slack > 0.0 {

@@ -178,7 +178,7 @@ fn held_down(
     own: &[Part],
     settings: &HeldDownSettings,
 ) -> Vec<bool> {
-    let &HeldDownSettings { sleeve, top } = settings;
+    let (sleeve, top) = (settings.sleeve, settings.top);
     let n = own.len();
     let from_sleeve = distances(n, &sheet.edges, sleeve, |i| {
         mesh.regions[i].meets(Region::ARMS)

@@ -2,7 +2,6 @@
 
 use super::context::DrapeContext;
 use super::state::Drape;
-use crate::settings::DrapeSettings;
 use tryon_cloth::solver::xpbd::{project_distance, project_hinge};
 use tryon_geometry::math::V3d;
 
@@ -13,31 +12,24 @@ impl Drape {
     /// Runs `steps` substeps of `h` seconds on a body and under garments that stand still. `weight` scales gravity: first
     /// gaps between panels close, then cloth falls.
     pub(crate) fn run(&mut self, context: &DrapeContext<'_>, steps: usize, h: f64, weight: f64) {
-        let DrapeSettings {
-            query_interval,
-            hood_interval,
-            untangle_interval,
-            sweeps,
-            max_compressed_speed,
-            ..
-        } = self.settings;
+        let settings = self.settings;
         self.steps += steps;
         for s in 0..steps {
-            let queries = s % query_interval == 0;
+            let queries = s % settings.query_interval == 0;
             if queries {
                 self.find_planes(context);
             }
             self.predict(h, weight);
-            for sweep in 0..sweeps {
+            for sweep in 0..settings.sweeps {
                 self.project_edges(h, (s + sweep) % 2 == 1);
             }
             self.project_hinges(h);
-            self.resolve_hood(s % hood_interval == 0, h);
+            self.resolve_hood(s % settings.hood_interval == 0, h);
             if self.fine && self.compressed {
-                self.limit_displacement(max_compressed_speed * h);
+                self.limit_displacement(settings.max_compressed_speed * h);
             }
             self.project_contacts(0.0);
-            let follows = self.crossings > 0 && s % untangle_interval == 0;
+            let follows = self.crossings > 0 && s % settings.untangle_interval == 0;
             if (weight >= 1.0 || self.hood.is_some()) && (queries || follows) {
                 self.untangle(queries);
             }

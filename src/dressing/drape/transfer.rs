@@ -1,7 +1,6 @@
 //! Motion of a garment with the body between two poses.
 
 use super::state::{Drape, on_arms};
-use crate::settings::FollowSettings;
 use crate::skin::Skin;
 use tryon_cloth::AnchorBinding;
 use tryon_cloth::contact::SurfaceFrame;
@@ -23,14 +22,15 @@ impl Drape {
     }
     /// Moves cloth near the skin with a body that goes from `from` to `to` (m).
     pub(crate) fn follow_skin(&mut self, from: &[P3], to: &[P3]) {
-        let FollowSettings {
-            within,
-            sleeve_within,
-        } = self.settings.follow;
+        let settings = self.settings.follow;
         for ((x, near), own) in self.x.iter_mut().zip(&self.nearest).zip(&self.own) {
             let v = near[0] as usize;
             let d = (from[v].coords.cast::<f64>() - *x).norm();
-            let within = if on_arms(*own) { sleeve_within } else { within };
+            let within = if on_arms(*own) {
+                settings.sleeve_within
+            } else {
+                settings.within
+            };
             let share = (2.0 - d / within).clamp(0.0, 1.0);
             *x += (to[v] - from[v]).cast::<f64>() * share;
         }

@@ -2,7 +2,6 @@
 
 use super::context::DrapeContext;
 use super::state::{Drape, on_arms};
-use crate::settings::UntangleSettings;
 use tryon_cloth::solver::xpbd::project_distance;
 use tryon_cloth::untangler::{UNTANGLE_GAP, UNTANGLE_STEP};
 use tryon_geometry::par::Par;
@@ -14,12 +13,8 @@ impl Drape {
         let Some(untangler) = &mut self.untangler else {
             return;
         };
-        let UntangleSettings {
-            slack_step,
-            max_slack,
-            slack_decay,
-            ..
-        } = self.settings.untangle;
+        let s = self.settings.untangle;
+        let (slack_step, max_slack, slack_decay) = (s.slack_step, s.max_slack, s.slack_decay);
         if full_query {
             untangler.invalidate();
         }

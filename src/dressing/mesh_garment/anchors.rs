@@ -61,9 +61,7 @@ fn highest_opening(openings: &[Vec<u32>], x: &[P3], settings: &AnchorSettings) -
 
 /// Vertices in a strip on the shoulders, or the top of a shirt front or a collar; `None` for a skeleton without shoulders.
 fn on_shoulders(template: &Template, x: &[P3], settings: &AnchorSettings) -> Option<Vec<u32>> {
-    let &AnchorSettings {
-        ring, strip, inner, ..
-    } = settings;
+    let (ring, strip, inner) = (settings.ring, settings.strip, settings.inner);
     let sk = template.skeleton();
     let at = |n: &str| sk.index(n).map(|j| sk.joints()[j].rest.cast::<f32>());
     let (neck, tip) = (at("neck")?, at("left_shoulder")?);

@@ -47,27 +47,20 @@ impl HoodChart {
         }
     }
     pub(super) fn point(&self, p: [f32; 2]) -> P3 {
-        let HoodPlaceSettings {
-            recline,
-            fold,
-            axis,
-            crown_turn,
-            nape,
-            ..
-        } = self.settings;
+        let s = self.settings;
         let from_crown = self
             .crown
             .iter()
             .map(|c| (c[0] - p[0]).hypot(c[1] - p[1]))
             .fold(f32::MAX, f32::min);
-        let out = self.width * quarter_circle((from_crown / crown_turn).clamp(0.0, 1.0));
+        let out = self.width * quarter_circle((from_crown / s.crown_turn).clamp(0.0, 1.0));
         // Laid back ever more from the neckline on (smoothstep), so that the hood does not intersect itself.
-        let up = (p[1] / fold).clamp(0.0, 1.0);
-        let (sin, cos) = (recline * up * up * (3.0 - 2.0 * up)).sin_cos();
-        let (y, z) = (p[1] - axis, -self.side * p[0]);
+        let up = (p[1] / s.fold).clamp(0.0, 1.0);
+        let (sin, cos) = (s.recline * up * up * (3.0 - 2.0 * up)).sin_cos();
+        let (y, z) = (p[1] - s.axis, -self.side * p[0]);
         P3::new(
             self.side * out,
-            self.top + nape + axis + y * cos + z * sin,
+            self.top + s.nape + s.axis + y * cos + z * sin,
             self.nape + z * cos - y * sin,
         )
     }

@@ -5,7 +5,7 @@ use super::placed_body::{PlacedBody, ends, sign};
 use super::tube::{Ellipse, HALF_PANELS};
 use crate::body_sections::BodySections;
 use crate::finished::{CROTCH_CLEARANCE, DEFAULT_RISE};
-use crate::settings::{LegPlaceSettings, PlaceSettings};
+use crate::settings::PlaceSettings;
 use std::f32::consts::{FRAC_PI_2, PI};
 use tryon_garment::{Panel, Side};
 use tryon_geometry::math::P3;
@@ -52,11 +52,7 @@ impl<'a> LegChart<'a> {
         }
     }
     pub(super) fn point(&self, p: [f32; 2]) -> P3 {
-        let PlaceSettings {
-            tube,
-            leg: LegPlaceSettings { inseam_gap, top },
-            ..
-        } = self.settings;
+        let (tube, settings) = (&self.settings.tube, self.settings.leg);
         let (left, front) = (sign(self.side), if self.front { 1.0 } else { -1.0 });
         // Share of the row from the inner to the outer side.
         let [lo, hi] = self.outline.span(p[1]);
@@ -66,7 +62,7 @@ impl<'a> LegChart<'a> {
         let y = self.waist + p[1];
 
         let leg = &self.sections.legs[usize::from(self.side == Side::Right)];
-        let section = leg.at(y.min(self.sections.heights.crotch - top));
+        let section = leg.at(y.min(self.sections.heights.crotch - settings.top));
         let Ellipse { center: c, half } =
             Ellipse::around(&section, 2.0 * (hi - lo).min(2.0 * self.half), tube);
         let on_leg = [
@@ -84,6 +80,6 @@ impl<'a> LegChart<'a> {
         let share = share * share * (3.0 - 2.0 * share);
         let mix = |k: usize| on_leg[k] + (on_hip[k] - on_leg[k]) * share;
         // Each trouser leg stays on its own side where the thighs touch.
-        P3::new(left * (left * mix(0)).max(*inseam_gap), y, mix(1))
+        P3::new(left * (left * mix(0)).max(settings.inseam_gap), y, mix(1))
     }
 }

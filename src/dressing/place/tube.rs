@@ -20,7 +20,7 @@ pub(super) struct Ellipse {
 impl Ellipse {
     /// Around a cross-section with clearance, scaled up to `girth` where the garment is wider than the body.
     pub(super) fn around(section: &CrossSection, girth: f32, settings: &TubeSettings) -> Self {
-        let &TubeSettings { clearance, widest } = settings;
+        let (clearance, widest) = (settings.clearance, settings.widest);
         let center = [
             (section.x[0] + section.x[1]) / 2.0,
             (section.z[0] + section.z[1]) / 2.0,
