@@ -64,7 +64,7 @@ pub fn write_positions(path: &Path, frames: &[Vec<P3>]) -> Result<(), FormatErro
     write_npy(path, &[frames.len() as u64, n as u64, 3], flat.into_iter())
 }
 
-/// Simulates a scene by [`crate::step`]; `config` as from [`Scene::config`]. `frame` receives the positions of each frame
+/// Simulates a scene by [`fn@crate::step`]; `config` as from [`Scene::config`]. `frame` receives the positions of each frame
 /// once they are known, the start as frame 0, and may break off; the report then covers the frames so far.
 ///
 /// # Errors
