@@ -1,6 +1,6 @@
 //! Measures of a finished garment in one size, the input of size advice.
 
-use super::settings::SizeSettings;
+use super::settings::WornSizeSettings;
 use tryon_body::measure::Measurements;
 use tryon_garment::{GarmentKind, Material, Pattern, Placement, Size};
 
@@ -66,7 +66,7 @@ pub struct FinishedGarment {
     /// Girths at chest, waist and hip, metres; 0 where it has none.
     pub girths: [f64; 3],
     /// Least ease there by design, and limits of the fit.
-    pub settings: SizeSettings,
+    pub settings: WornSizeSettings,
     /// Lowest hem; `None` for cloth that hangs from no place.
     pub hem: Option<Hem>,
 }
@@ -79,7 +79,7 @@ impl From<&Pattern> for FinishedGarment {
             size: pattern.size,
             material: pattern.material.clone(),
             girths: pattern.finished,
-            settings: SizeSettings::default(),
+            settings: WornSizeSettings::default(),
             hem: hem(pattern),
         }
     }

@@ -73,7 +73,7 @@ pub use fit_map::{FIT_COLORS, FitMap, FitProbe, RegionFit, VertexFit};
 pub use mesh_garment::MeshGarment;
 pub use options::{DressMs, DressOptions, DressReport};
 pub use rig_standing::rig_standing;
-pub use settings::{FitMapSettings, MeshGarmentSettings, SizeSettings, StageSettings};
+pub use settings::{FitMapSettings, MeshGarmentSettings, StageSettings, WornSizeSettings};
 pub use sew::GarmentSource;
 pub use source_body::SourceBody;
 pub use suggest::{FitClass, GirthEase, Misfit, Suggestion, assess, check_wearable, suggest};

@@ -5,7 +5,7 @@ use super::drape::{Drape, Layers};
 use super::error::DressError;
 use super::options::{DressOptions, DressReport, ms};
 use super::refine::prolong;
-use super::settings::{CanonicalSettings, DrapeSettings};
+use super::settings::{CanonicalSettings, OutfitDrapeSettings};
 use super::sew::PlacedSheet;
 use super::skin::{Skin, SkinModel};
 use super::waistband::GarmentOnSkin;
@@ -112,7 +112,7 @@ struct OutfitDrape<'a> {
     anchors: Vec<Vec<AnchorBinding>>,
     layers: Layers,
     untangle: bool,
-    settings: DrapeSettings,
+    settings: OutfitDrapeSettings,
 }
 
 impl<'a> OutfitDrape<'a> {

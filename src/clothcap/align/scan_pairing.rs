@@ -164,7 +164,7 @@ pub(crate) struct ScanPairing {
     /// Motion of a face since it was found up to which it is kept, metres; 0 keeps none.
     settled: f32,
     /// Searches start at the last face: of two faces equally near, another one may be found.
-    starts: bool,
+    is_warm: bool,
     kept: Vec<Option<KeptFace>>,
     /// Travel of each face so far: the sum of the largest motions of its corners, metres.
     travel: Vec<f32>,
@@ -182,7 +182,7 @@ impl ScanPairing {
             around: Csr::of_faces(rest.len(), faces),
             is_smooth,
             settled: 0.0,
-            starts: false,
+            is_warm: false,
             kept: Vec::new(),
             travel: Vec::new(),
             last: Vec::new(),
@@ -193,7 +193,7 @@ impl ScanPairing {
     /// Begins a scan of so many points; `settled` is the motion up to which a face is kept, metres; at 0 each search is
     /// made from nothing.
     pub(crate) fn begin(&mut self, points: usize, settled: f32) {
-        (self.settled, self.starts) = (settled, settled > 0.0);
+        (self.settled, self.is_warm) = (settled, settled > 0.0);
         self.kept.clear();
         self.kept.resize(points, None);
         self.travel.clear();
@@ -315,7 +315,7 @@ impl ScanPairing {
             let point = self.tree.point_of_face(surface, p, k.face);
             return Some((point, FaceSearch::Skipped));
         }
-        let near = kept.filter(|_| self.starts).map(|k| k.face);
+        let near = kept.filter(|_| self.is_warm).map(|k| k.face);
         let query = WarmQuery {
             tree: &self.tree,
             vertices: surface,

@@ -2,7 +2,7 @@
 
 use crate::hood::Hood;
 use crate::plane::DrapePlane;
-use crate::settings::{DrapeSettings, HeldDownSettings};
+use crate::settings::{HeldDownSettings, OutfitDrapeSettings};
 use crate::skin::Skin;
 use std::collections::BTreeSet;
 use tryon_cloth::contact::Part;
@@ -32,7 +32,7 @@ pub(super) struct EdgeConstraint {
 /// One garment being draped.
 #[derive(Debug, Default)]
 pub(crate) struct Drape {
-    pub(super) settings: DrapeSettings,
+    pub(super) settings: OutfitDrapeSettings,
     /// Positions in the world (m).
     pub(crate) x: Vec<V3d>,
     pub(super) velocity: Vec<V3d>,
@@ -80,7 +80,7 @@ impl Drape {
         mesh: &GarmentMesh,
         sheet: &Sheet,
         x: Vec<P3>,
-        settings: &DrapeSettings,
+        settings: &OutfitDrapeSettings,
     ) -> Self {
         let n = x.len();
         let own: Vec<Part> = mesh.regions.iter().map(|r| r.decisive().0).collect();

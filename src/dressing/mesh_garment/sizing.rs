@@ -4,7 +4,7 @@ use super::grading::{Grading, LimbAxes};
 use super::piece::GarmentPiece;
 use crate::body_sections::{BodySections, SectionStack};
 use crate::finished::{FinishedGarment, HangsFrom, Hem};
-use crate::settings::{MeshGarmentSettings, SizeSettings};
+use crate::settings::{MeshGarmentSettings, WornSizeSettings};
 use crate::suggest::{Suggestion, body_girths, first_with_ease};
 use tryon_body::measure::{Measurements, measure};
 use tryon_body::parts::vertex_masks;
@@ -81,7 +81,7 @@ impl Sizing {
                 kind,
                 size,
                 material: cloth.material.clone(),
-                settings: SizeSettings {
+                settings: WornSizeSettings {
                     least_ease: std::array::from_fn(|k| least[k].min(girths[k] - skin[k])),
                     ..settings.size
                 },

@@ -1,6 +1,6 @@
 //! Orientation, texture coordinates and joint weights of a piece of cloth.
 
-use crate::settings::SurfaceSettings;
+use crate::settings::GarmentSurfaceSettings;
 use tryon_body::{SkinBinding, Template};
 use tryon_garment::GarmentMesh;
 use tryon_geometry::math::{P3, V3};
@@ -51,7 +51,7 @@ pub(super) fn follow_both_legs(
     template: &Template,
     x: &[P3],
     binding: &mut SkinBinding,
-    settings: &SurfaceSettings,
+    settings: &GarmentSurfaceSettings,
 ) {
     let sk = template.skeleton();
     let at = |n: &str| sk.index(n).map(|j| (j, sk.joints()[j].rest.cast::<f32>()));

@@ -4,7 +4,7 @@ use super::settings;
 
 settings! {
     /// Settings of the drape.
-    pub struct DrapeSettings {
+    pub struct OutfitDrapeSettings {
         /// Substeps and bodies.
         pub schedule: ScheduleSettings = ScheduleSettings::default(),
         /// Rate of velocity damping (1/s): a skirt swings out in a quarter of a second.

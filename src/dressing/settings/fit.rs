@@ -4,7 +4,7 @@ use super::settings;
 
 settings! {
     /// Settings of size advice.
-    pub struct SizeSettings {
+    pub struct WornSizeSettings {
         /// Least ease at chest, waist and hip by design, metres: a waistband needs none, it sits lower on a fuller body.
         pub least_ease: [f64; 3] = [0.04, -0.03, 0.02],
         /// Ease beyond the least from which a place counts as loose, metres: two sizes of the table.

@@ -1,6 +1,6 @@
 //! Settings of mesh garments: classification, anchors, rest shape, sizes, retargeting, guessed bodies.
 
-use super::{SectionSettings, SizeSettings, settings};
+use super::{SectionSettings, WornSizeSettings, settings};
 use tryon_garment::import::CoarsenSettings;
 
 settings! {
@@ -19,7 +19,7 @@ settings! {
         /// Clearance over the skin.
         pub lift: LiftSettings = LiftSettings::default(),
         /// Texture coordinates and joint weights.
-        pub surface: SurfaceSettings = SurfaceSettings::default(),
+        pub surface: GarmentSurfaceSettings = GarmentSurfaceSettings::default(),
         /// Retargeting.
         pub retarget: RetargetSettings = RetargetSettings::default(),
         /// Body under a garment whose file has none.
@@ -27,7 +27,7 @@ settings! {
         /// Cross-sections of the source body.
         pub sections: SectionSettings = SectionSettings::default(),
         /// Size advice.
-        pub size: SizeSettings = SizeSettings::default(),
+        pub size: WornSizeSettings = WornSizeSettings::default(),
         /// Share of a body's girth below which cloth does not go around it. Smaller takes scarves for tops.
         pub around: f64 = 0.8,
         /// Heights between which the chest is fullest, shares of the way from waist to shoulders.
@@ -83,7 +83,7 @@ settings! {
     }
 
     /// Settings of texture coordinates and joint weights.
-    pub struct SurfaceSettings {
+    pub struct GarmentSurfaceSettings {
         /// Radius at which unrolled texture coordinates are lengths, metres: about a trunk's.
         pub unroll_radius: f32 = 0.15,
         /// Height below the hip joints over which a skirt comes to follow the legs alone, metres.

@@ -7,13 +7,13 @@ mod place;
 mod sections;
 
 pub use drape::{
-    DrapeContactSettings, DrapeSettings, FollowSettings, HeldDownSettings, HoodDrapeSettings,
+    DrapeContactSettings, FollowSettings, HeldDownSettings, HoodDrapeSettings, OutfitDrapeSettings,
     ScheduleSettings, UntangleSettings,
 };
-pub use fit::{FitMapSettings, SizeSettings};
+pub use fit::{FitMapSettings, WornSizeSettings};
 pub use mesh_garment::{
-    AnchorSettings, ClassifierSettings, GuessSettings, LiftSettings, MeshGarmentSettings,
-    PieceSettings, RetargetSettings, SurfaceSettings,
+    AnchorSettings, ClassifierSettings, GarmentSurfaceSettings, GuessSettings, LiftSettings,
+    MeshGarmentSettings, PieceSettings, RetargetSettings,
 };
 pub use place::{
     HoodPlaceSettings, LegPlaceSettings, PlaceSettings, SewSettings, SkirtPlaceSettings,
@@ -33,8 +33,8 @@ settings! {
         /// Placement of panels.
         pub place: PlaceSettings = PlaceSettings::default(),
         /// Drape.
-        pub drape: DrapeSettings = DrapeSettings::default(),
+        pub drape: OutfitDrapeSettings = OutfitDrapeSettings::default(),
         /// Sizes that patterns are worn in.
-        pub size: SizeSettings = SizeSettings::default(),
+        pub size: WornSizeSettings = WornSizeSettings::default(),
     }
 }

@@ -22,7 +22,7 @@ pub use segment::{
     ExpectedBodySettings, ExtremitySettings, HandSettings, PersonSettings, PlaneSettings,
     RefusalSettings, SegmentSettings,
 };
-pub use shape::{ShapeSettings, SizeSettings, SurfaceSettings};
+pub use shape::{BodySizeSettings, ShapeSettings, SurfaceSettings};
 pub use start::{HypothesisSettings, ProposalSettings, StartSettings};
 pub use step::{ChangeSettings, StepSettings};
 pub use tracker::TrackerConfig;

@@ -30,13 +30,13 @@ settings! {
         /// Allowance that is added to it, metres.
         pub residual_allowance: f64 = 5e-4,
         /// Bone scales and shape coefficients.
-        pub size: SizeSettings = SizeSettings::default(),
+        pub size: BodySizeSettings = BodySizeSettings::default(),
         /// Displacements.
         pub surface: SurfaceSettings = SurfaceSettings::default(),
     }
 
     /// Settings of size and shape coefficients.
-    pub struct SizeSettings {
+    pub struct BodySizeSettings {
         /// Prior of a coefficient (one standard deviation = 1), per point, m²: larger keeps the mean shape against readings.
         pub prior: f64 = 5e-7,
         /// Standard deviation of a bone's scale: with a shape space, which explains most of it, and without one. Larger lets
