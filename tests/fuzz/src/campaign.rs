@@ -121,13 +121,14 @@ impl Campaign {
             self.try_input(seed)?;
         }
 
+        let words: Vec<&str> = self.target.words.split_whitespace().collect();
         let mut done = Ok(());
         arbtest(|u| {
             let mut input = u.choose(&valid)?.clone();
             let donor = u.choose(&valid)?;
             let mut mutator = Mutator {
                 rng: Pcg64Mcg::seed_from_u64(u.arbitrary()?),
-                words: self.target.words,
+                words: &words,
                 longest: self.target.longest,
             };
             mutator.mutate(&mut input, donor);

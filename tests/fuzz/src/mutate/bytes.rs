@@ -5,40 +5,17 @@ use rand::Rng;
 use rand::seq::IndexedRandom;
 
 /// Integers at which sizes, offsets and signs break.
+#[rustfmt::skip]
 const INTEGERS: [u64; 18] = [
-    0,
-    1,
-    2,
-    0x7f,
-    0x80,
-    0xff,
-    0x100,
-    0x7fff,
-    0xffff,
-    0x1_0000,
-    0x7fff_ffff,
-    0x8000_0000,
-    0xffff_fffe,
-    0xffff_ffff,
-    0x1_0000_0000,
-    0x7fff_ffff_ffff_ffff,
-    0x8000_0000_0000_0000,
+    0, 1, 2, 0x7f, 0x80, 0xff, 0x100, 0x7fff, 0xffff, 0x1_0000, 0x7fff_ffff, 0x8000_0000,
+    0xffff_fffe, 0xffff_ffff, 0x1_0000_0000, 0x7fff_ffff_ffff_ffff, 0x8000_0000_0000_0000,
     u64::MAX,
 ];
 
 /// Numbers at which arithmetic breaks.
+#[rustfmt::skip]
 const REALS: [f64; 12] = [
-    0.0,
-    -0.0,
-    1.0,
-    -1.0,
-    1e-320,
-    1e-30,
-    1e30,
-    -1e30,
-    f64::MAX,
-    f64::INFINITY,
-    f64::NEG_INFINITY,
+    0.0, -0.0, 1.0, -1.0, 1e-320, 1e-30, 1e30, -1e30, f64::MAX, f64::INFINITY, f64::NEG_INFINITY,
     f64::NAN,
 ];
 

@@ -1,6 +1,6 @@
 //! Bodies and motion: npz, npy, BVH, ASF with AMC, MakeHuman's bindings and targets.
 
-use super::{Target, lossy, text};
+use super::{Target, le, lossy, packed, text};
 use crate::bundle::Bundle;
 use crate::execute::Scratch;
 use crate::pack;
@@ -18,12 +18,7 @@ pub(super) const NPZ: Target = Target::new(
     "npz",
     "src/formats/npz.rs, src/body/import.rs",
     |b, scratch| {
-        let raw = b.get("body.npz");
-        let archive = if raw.is_empty() {
-            pack::zip(&b.0)?
-        } else {
-            raw.to_vec()
-        };
+        let archive = packed(b, "body.npz", || pack::zip(&b.0))?;
         let path = scratch.file("body.npz", &archive)?;
         let arrays = read_smpl(&path).map_err(text)?;
         let template = template_from_smpl("body", &arrays).map_err(text)?;
@@ -31,10 +26,7 @@ pub(super) const NPZ: Target = Target::new(
     },
     npz_seeds,
 )
-.words(&[
-    "'<f8'", "'<f4'", "'<i4'", "'<u4'", "'|O'", "'|S3'", "'<U5'", "True", "False", "(4, 3)",
-    "(0,)", "()",
-])
+.words("'<f8' '<f4' '<i4' '<u4' '|O' '|S3' '<U5' True False (4,3) (0,) ()")
 .allow(1 << 20, 2000);
 
 /// Single arrays.
@@ -53,16 +45,7 @@ pub(super) const NPY: Target = Target::new(
         ]
     },
 )
-.words(&[
-    "'<f2'",
-    "'<f4'",
-    "'<f8'",
-    "'descr'",
-    "'shape'",
-    "True",
-    "False",
-    "(9999999999,)",
-]);
+.words("'<f2' '<f4' '<f8' 'descr' 'shape' True False (9999999999,)");
 
 /// Motion clips.
 pub(super) const MOTION: Target = Target::new(
@@ -85,36 +68,10 @@ pub(super) const MOTION: Target = Target::new(
         ]
     },
 )
-.words(&[
-    "HIERARCHY",
-    "ROOT",
-    "JOINT",
-    "End",
-    "Site",
-    "OFFSET",
-    "CHANNELS",
-    "Xposition",
-    "Zrotation",
-    "MOTION",
-    "Frames:",
-    "Frame",
-    "Time:",
-    "{",
-    "}",
-    ":root",
-    ":bonedata",
-    ":hierarchy",
-    "begin",
-    "end",
-    "dof",
-    "rx",
-    "axis",
-    "XYZ",
-    "order",
-    "length",
-    "limits",
-    "(-180 180)",
-])
+.words(
+    "HIERARCHY ROOT JOINT End Site OFFSET CHANNELS Xposition Zrotation MOTION Frames: Frame Time: \
+     { } :root :bonedata :hierarchy begin end dof rx axis XYZ order length limits (-180",
+)
 // Clips are resampled to a fixed rate.
 .allow(512 << 10, 2000);
 
@@ -125,17 +82,7 @@ pub(super) const MAKEHUMAN: Target = Target::new(
     run_makehuman,
     || vec![Bundle::of("a.mhclo", MHCLO), Bundle::of("a.target", TARGET)],
 )
-.words(&[
-    "verts",
-    "obj_file",
-    "x_scale",
-    "z_depth",
-    "delete_verts",
-    "basemesh",
-    "material",
-    "-",
-    "uuid",
-])
+.words("verts obj_file x_scale z_depth delete_verts basemesh material - uuid")
 // `delete_verts 0 - N` is a list of N vertices, of which a body has at most 65,536.
 .allow(1 << 20, 400);
 
@@ -181,13 +128,12 @@ fn npy(descr: &str, shape: &str, data: &[u8]) -> Vec<u8> {
 
 fn f64s(shape: &[usize], values: &[f64]) -> Vec<u8> {
     let sides: Vec<String> = shape.iter().map(usize::to_string).collect();
-    let data: Vec<u8> = values.iter().flat_map(|v| v.to_le_bytes()).collect();
+    let data = le(values, f64::to_le_bytes);
     npy("'<f8'", &format!("({},)", sides.join(", ")), &data)
 }
 
 fn u32s(shape: &str, values: &[u32]) -> Vec<u8> {
-    let data: Vec<u8> = values.iter().flat_map(|v| v.to_le_bytes()).collect();
-    npy("'<u4'", shape, &data)
+    npy("'<u4'", shape, &le(values, u32::to_le_bytes))
 }
 
 /// A body of four vertices and two joints.

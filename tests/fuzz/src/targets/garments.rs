@@ -24,7 +24,7 @@ pub(super) const FABRIC: Target = Target::new(
         vec![Bundle::of("fabric.json", json.to_string())]
     },
 )
-.words(&["density", "stretching", "bending"]);
+.words("density stretching bending");
 
 /// GarmentCode's patterns.
 pub(super) const GARMENTCODE: Target = Target::new(
@@ -41,17 +41,7 @@ pub(super) const GARMENTCODE: Target = Target::new(
     },
     || vec![Bundle::of("p.json", SQUARE)],
 )
-.words(&[
-    "circle",
-    "quadratic",
-    "cubic",
-    "curvature",
-    "params",
-    "endpoints",
-    "units_in_meter",
-    "translation",
-    "rotation",
-])
+.words("circle quadratic cubic curvature params endpoints units_in_meter translation rotation")
 .allow(1 << 20, 2000);
 
 const SQUARE: &str = r#"{"pattern":{"panels":{"a":{"translation":[0,0,10],"rotation":[0,10,0],
@@ -78,7 +68,7 @@ pub(super) const PATTERN: Target = Target::new(
         vec![Bundle::of("tshirt.json", json)]
     },
 )
-.words(&["Line", "Quadratic", "Cubic", "reversed", "panel", "edge"])
+.words("Line Quadratic Cubic reversed panel edge")
 .allow(1 << 20, 400);
 
 /// Scenes of `tryon simulate` and of requests.
@@ -104,15 +94,7 @@ pub(super) const SCENE: Target = Target::new(
         ]
     },
 )
-.words(&[
-    "sphere",
-    "capsule",
-    "world",
-    "body",
-    "motion",
-    "motion_csv",
-    "mesh_obj",
-])
+.words("sphere capsule world body motion motion_csv mesh_obj")
 .allow(1 << 20, 2000);
 
 const MESH: &str = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nf 1/1 2/2 3/3\nf 1/1 3/3 4/4\n";

@@ -31,7 +31,7 @@ pub(super) const DEPTH: Target = Target::new(
         vec![Bundle::of("depth.tdz", packed)]
     },
 )
-.words(&["TDZ1"])
+.words("TDZ1")
 .allow(1 << 20, PER_PACKED_BYTE);
 
 /// Positions of the wire: messages of one stream.
@@ -77,7 +77,7 @@ pub(super) const PNG: Target = Target::new(
         ]
     },
 )
-.words(&["IHDR", "PLTE", "IDAT", "tRNS", "IEND"])
+.words("IHDR PLTE IDAT tRNS IEND")
 .allow(1 << 20, PER_PACKED_BYTE);
 
 /// JPEG, also behind the choice by signature.
@@ -97,7 +97,7 @@ pub(super) const JPEG: Target = Target::new(
         )]
     },
 )
-.words(&["\u{ff}\u{d8}", "JFIF", "Exif\0\0"])
+.words("\u{ff}\u{d8} JFIF Exif\0\0")
 .allow(1 << 20, PER_JPEG_BYTE);
 
 fn depth() -> DepthImage {

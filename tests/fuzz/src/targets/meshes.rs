@@ -1,11 +1,10 @@
-//! Meshes: OBJ with MTL, scans, PLY, glTF; pairs of them: collision queries.
+//! Meshes: OBJ with MTL, scans, PLY, glTF.
 
-use super::{Target, lossy, text};
+use super::{Target, lossy, packed, text};
 use crate::bundle::Bundle;
 use crate::execute::Scratch;
 use crate::pack;
 use std::path::Path;
-use tryon::formats::ccd_queries::read_ccd_queries;
 use tryon::formats::gltf::{GlbMesh, encode_glb, parse_gltf};
 use tryon::formats::obj::parse_obj;
 use tryon::formats::scan::{PlyMesh, read_scan, write_ply};
@@ -13,10 +12,7 @@ use tryon::formats::sewn_obj::parse_sewn_obj;
 use tryon::garment::import::read_mesh;
 use tryon::geometry::math::{P3, V3};
 
-const OBJ_WORDS: &[&str] = &[
-    "v", "vt", "vn", "f", "o", "g", "s", "mtllib", "usemtl", "stitch", "1/1/1", "1//1", "-1",
-    "map_Kd", "newmtl", "Kd", "\\",
-];
+const OBJ_WORDS: &str = "v vt vn f o g s mtllib usemtl stitch 1/1/1 1//1 -1 map_Kd newmtl Kd \\";
 
 const CLOTH: &str = "# a cloth\nmtllib cloth.mtl\nv 0 0 0 1 0 0\nv 1 0 0 0 1 0\nv 1 1 0 0 0 1\nv 0 1 0 1 1 1\n\
     vt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nvn 0 0 1\nusemtl red\ng front\nf 1/1/1 2/2/1 3/3/1\nf 1/1/1 3/3/1 4/4/1\n\
@@ -53,31 +49,6 @@ pub(super) const SCAN_OBJ: Target = Target::new(
 .words(OBJ_WORDS)
 .allow(1 << 20, 60_000);
 
-/// Queries of continuous collision detection, rationals as CSV.
-pub(super) const CCD_QUERIES: Target = Target::new(
-    "ccd-queries",
-    "src/formats/ccd_queries",
-    |b, scratch| {
-        let path = scratch.file("queries.csv", b.first())?;
-        let queries = read_ccd_queries(&path).map_err(text)?;
-        Ok(queries.len())
-    },
-    || {
-        vec![Bundle::of(
-            "queries.csv",
-            "-3,4,36893488147419103233,36893488147419103232,0,1,1\n".repeat(8),
-        )]
-    },
-)
-.words(&[
-    "-",
-    ",",
-    "0,1",
-    "1\n",
-    "340282366920938463463374607431768211456",
-])
-.allow(512 << 10, 400);
-
 /// PLY, text and binary.
 pub(super) const PLY: Target = Target::new(
     "ply",
@@ -85,83 +56,31 @@ pub(super) const PLY: Target = Target::new(
     |b, s| scan(b, s, "cloth.ply"),
     ply_seeds,
 )
-.words(&[
-    "ply",
-    "format",
-    "ascii",
-    "binary_little_endian",
-    "binary_big_endian",
-    "1.0",
-    "element",
-    "vertex",
-    "face",
-    "property",
-    "list",
-    "uchar",
-    "int",
-    "uint",
-    "float",
-    "double",
-    "x",
-    "y",
-    "z",
-    "nx",
-    "red",
-    "label",
-    "vertex_indices",
-    "end_header",
-    "comment",
-    "TextureFile",
-]);
+.words(
+    "ply format ascii binary_little_endian binary_big_endian 1.0 element vertex face property \
+     list uchar int uint float double x y z nx red label vertex_indices end_header comment \
+     TextureFile",
+);
 
 /// glTF as a garment and as a scan.
 pub(super) const GLTF: Target = Target::new(
     "gltf",
     "src/formats/gltf/reader.rs, src/formats/scan/gltf.rs",
     |b, scratch| {
-        let name = if b.get("model.glb").is_empty() {
-            "model.json"
-        } else {
-            "model.glb"
-        };
-        let raw = b.get("model.glb");
-        let packed = match name {
-            "model.glb" => raw.to_vec(),
-            _ => pack::glb(b.get("model.json"), b.get("model.bin"))?,
-        };
-        let path = scratch.file("model.glb", &packed)?;
-        let model = parse_gltf(&packed, &path).map(|m| m.parts.len());
+        let parts = || pack::glb(b.get("model.json"), b.get("model.bin"));
+        let file = packed(b, "model.glb", parts)?;
+        let path = scratch.file("model.glb", &file)?;
+        let model = parse_gltf(&file, &path).map(|m| m.parts.len());
         let scan = read_scan(&path).map(|s| s.points.len());
         model.or(scan).map_err(text)
     },
     gltf_seeds,
 )
-.words(&[
-    "POSITION",
-    "NORMAL",
-    "TEXCOORD_0",
-    "COLOR_0",
-    "JOINTS_0",
-    "WEIGHTS_0",
-    "bufferView",
-    "byteOffset",
-    "byteLength",
-    "byteStride",
-    "componentType",
-    "count",
-    "sparse",
-    "indices",
-    "mode",
-    "uri",
-    "data:,",
-    "children",
-    "matrix",
-    "node",
-    "scene",
-    "extensions",
-    "KHR_texture_transform",
-    "EXT_meshopt_compression",
-])
+.words(
+    "POSITION NORMAL TEXCOORD_0 COLOR_0 JOINTS_0 WEIGHTS_0 bufferView byteOffset byteLength \
+     byteStride componentType count sparse indices mode uri data:, children matrix node scene \
+     extensions KHR_texture_transform EXT_meshopt_compression",
+)
 .allow(1 << 20, 60_000);
 
 fn scan(b: &Bundle, scratch: &Scratch, name: &str) -> Result<usize, String> {

@@ -40,8 +40,8 @@ pub struct Target {
     pub run: fn(&Bundle, &Scratch) -> Result<usize, String>,
     /// Valid inputs.
     pub seeds: fn() -> Vec<Bundle>,
-    /// Tokens of the format.
-    pub words: &'static [&'static str],
+    /// Tokens of the format, with spaces between.
+    pub words: &'static str,
     /// Memory.
     pub allowance: Allowance,
     /// Longest member, bytes.
@@ -60,12 +60,12 @@ impl Target {
             decoder,
             run,
             seeds,
-            words: &[],
+            words: "",
             allowance: COMMON,
             longest: LONGEST,
         }
     }
-    const fn words(mut self, words: &'static [&'static str]) -> Self {
+    const fn words(mut self, words: &'static str) -> Self {
         self.words = words;
         self
     }
@@ -87,7 +87,6 @@ pub const TARGETS: &[Target] = &[
     images::JPEG,
     meshes::OBJ,
     meshes::SCAN_OBJ,
-    meshes::CCD_QUERIES,
     meshes::PLY,
     meshes::GLTF,
     bodies::NPZ,
@@ -109,6 +108,23 @@ pub const TARGETS: &[Target] = &[
 /// Text of an error.
 fn text(e: impl std::fmt::Display) -> String {
     e.to_string()
+}
+
+/// Little-endian bytes of numbers.
+fn le<const N: usize, T: Copy>(values: &[T], bytes: fn(T) -> [u8; N]) -> Vec<u8> {
+    values.iter().flat_map(|v| bytes(*v)).collect()
+}
+
+/// The member `raw`, or what `pack` makes of all members where there is none.
+fn packed(
+    b: &Bundle,
+    raw: &str,
+    pack: impl FnOnce() -> Result<Vec<u8>, String>,
+) -> Result<Vec<u8>, String> {
+    match b.get(raw) {
+        [] => pack(),
+        raw => Ok(raw.to_vec()),
+    }
 }
 
 /// Input as text, as readers of files see it.

@@ -1,6 +1,6 @@
 //! Recordings: MCAP files and RGBD folders.
 
-use super::{Target, text};
+use super::{Target, packed, text};
 use crate::bundle::Bundle;
 use crate::pack;
 use std::path::Path;
@@ -15,12 +15,7 @@ pub(super) const MCAP: Target = Target::new(
     "mcap",
     "src/formats/mcap_file",
     |b, scratch| {
-        let raw = b.get("a.mcap");
-        let file = if raw.is_empty() {
-            pack::mcap(&b.0)?
-        } else {
-            raw.to_vec()
-        };
+        let file = packed(b, "a.mcap", || pack::mcap(&b.0))?;
         frames(&scratch.file("a.mcap", &file)?)
     },
     || {
@@ -36,15 +31,7 @@ pub(super) const MCAP: Target = Target::new(
         vec![Bundle::of("a.mcap", raw), messages]
     },
 )
-.words(&[
-    "16UC1",
-    "mono16",
-    "rgb8",
-    "jpeg",
-    "png",
-    "depth_camera",
-    "color_camera",
-])
+.words("16UC1 mono16 rgb8 jpeg png depth_camera color_camera")
 .allow(2 << 20, 60_000);
 
 /// RGBD folders.
@@ -63,18 +50,7 @@ pub(super) const FOLDER: Target = Target::new(
         vec![folder]
     },
 )
-.words(&[
-    "width",
-    "height",
-    "fx",
-    "cx",
-    "depth_scale",
-    "color",
-    "color_from_depth",
-    "translation",
-    "rotation",
-    "..",
-])
+.words("width height fx cx depth_scale color color_from_depth translation rotation ..")
 .allow(1 << 20, 60_000);
 
 fn frames(path: &Path) -> Result<usize, String> {

@@ -66,7 +66,7 @@ pub(super) const TOKEN: Target = Target::new(
         ]
     },
 )
-.words(&["eyJ", ".", "alg", "none", "HS256", "EdDSA", "aud", "exp", "nbf", "methods"]);
+.words("eyJ . alg none HS256 EdDSA aud exp nbf methods");
 
 /// Sealed frames: only the genuine one opens.
 pub(super) const SEALED: Target = Target::new(

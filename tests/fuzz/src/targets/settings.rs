@@ -22,18 +22,7 @@ pub(super) const CONFIG: Target = Target::new(
         vec![Bundle::of("tryon.toml", file).and("flags.txt", flags)]
     },
 )
-.words(&[
-    "[capture]",
-    "[[capture.cameras]]",
-    "address",
-    "\"127.0.0.1:0\"",
-    "true",
-    "[]",
-    "{}",
-    "'''",
-    "=",
-    "1979-05-27",
-])
+.words("[capture] [[capture.cameras]] address \"127.0.0.1:0\" true [] {} ''' = 1979-05-27")
 .allow(1 << 20, 400);
 
 /// Host and Origin of a request.
@@ -61,14 +50,4 @@ pub(super) const HOSTS: Target = Target::new(
         vec![bundle.and("origin.txt", "https://kiosk.example")]
     },
 )
-.words(&[
-    "localhost",
-    "[::1]",
-    "127.0.0.1",
-    "@",
-    ":",
-    "%00",
-    "https://",
-    "xn--",
-    ".",
-]);
+.words("localhost [::1] 127.0.0.1 @ : %00 https:// xn-- .");

@@ -1,6 +1,6 @@
 //! Messages of the wire: every request, bus frames, garment frames, bodies.
 
-use super::{Target, text};
+use super::{Target, le, text};
 use crate::bundle::Bundle;
 use crate::execute::Scratch;
 use bytes::Bytes;
@@ -19,15 +19,7 @@ pub(super) const REQUESTS: Target = Target::new(
     run_request,
     request_seeds,
 )
-.words(&[
-    "tshirt",
-    "front",
-    "store",
-    "M",
-    "../",
-    "\u{1f600}",
-    "mesh_obj",
-])
+.words("tshirt front store M ../ \u{1f600} mesh_obj")
 // The bar of docs/attack.md: 1 MiB for a request of 10 KiB.
 .allow(512 << 10, 50);
 
@@ -42,7 +34,7 @@ pub(super) const FRAME: Target = Target::new(
     },
     || vec![Bundle::of("frame.pb", frame().encode_to_vec())],
 )
-.words(&["TDZ1"])
+.words("TDZ1")
 // Pixels are a size that the calibration states and zstd reaches; JPEG's tables.
 .allow(1 << 20, 60_000);
 
@@ -87,7 +79,7 @@ pub(super) const BODY: Target = Target::new(
     },
     body_seeds,
 )
-.words(&["pelvis", "left_hip"]);
+.words("pelvis left_hip");
 
 macro_rules! requests {
     ($($name:ident),* $(,)?) => {
@@ -282,15 +274,15 @@ fn frame() -> v1::RgbdFrame {
 }
 
 fn f32s(values: &[f32]) -> Bytes {
-    values.iter().flat_map(|v| v.to_le_bytes()).collect()
+    le(values, f32::to_le_bytes).into()
 }
 
 fn f64s(values: &[f64]) -> Bytes {
-    values.iter().flat_map(|v| v.to_le_bytes()).collect()
+    le(values, f64::to_le_bytes).into()
 }
 
 fn u32s(values: &[u32]) -> Bytes {
-    values.iter().flat_map(|v| v.to_le_bytes()).collect()
+    le(values, u32::to_le_bytes).into()
 }
 
 /// A keyframe of a flag of four vertices, and two frames coded against it.
