@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Articulated ICP on Open3D's point clouds and nearest neighbours, beside this project's tracker, on the same recordings.
 
-    python3 benches/peers/articulated_icp.py --data ../shared/data [--frames N] [--tracker target/release/examples/track_sequences]
+    python3 benches/peers/articulated_icp.py --data ../shared/data [--frames N] [--bench target/release/tryon-bench]
 
 Both are given the subject's own body. The peer starts from the recording's rough start (root position, rest pose), ours
 from nothing. The peer: depth cropped to a box around the last pelvis, floor and back wall taken out by Open3D's
@@ -17,8 +17,8 @@ import argparse
 import json
 import os
 import pathlib
-import re
 import subprocess
+import tempfile
 import time
 
 os.environ.setdefault("OMP_NUM_THREADS", "1")
@@ -227,24 +227,26 @@ def log(r):
     return v if t < 1e-6 else v * (t / max(np.sin(t), 1e-9))
 
 
-def ours(program, folder, body):
-    text = subprocess.run([program, "--body", str(body), str(folder)], capture_output=True, text=True, check=True).stdout
-    figures = re.search(r"joints ([\d.]+) mm \(worst frame ([\d.]+)\).*step ([\d.]+) ms", text)
-    return [float(figures[k]) for k in (1, 2, 3)]
+def ours(program, data, scene):
+    with tempfile.TemporaryDirectory() as out:
+        command = [program, "tracking", "--data", str(data), "--only", scene, "--own", "--set", "{}", "--out", out]
+        subprocess.run(command, capture_output=True, check=True)
+        row = json.load(open(pathlib.Path(out) / "tracking.json"))["rows"][0]
+    return row["errors"]["joints_mm"], row["errors"]["worst_frame_mm"], row["run_ms"]
 
 
 def main():
     a = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     a.add_argument("--data", type=pathlib.Path, required=True)
     a.add_argument("--frames", type=int, default=10_000)
-    a.add_argument("--tracker", default="target/release/examples/track_sequences")
+    a.add_argument("--bench", default="target/release/tryon-bench")
     a = a.parse_args()
     print("| sequence | tracker | joints, mm | worst frame | ms a frame | of it compiled |\n|---|---|---|---|---|---|")
     for scene, subject in SCENES:
         folder, body = a.data / "sequences" / scene, a.data / "body/makehuman_smpl_layout" / f"{subject}.npz"
         e, w, ms, native = follow(folder, Body(body), a.frames)
         print(f"| {scene} | articulated ICP, Open3D {o3d.__version__} | {e:.1f} | {w:.1f} | {ms:.0f} | {native:.0f} |", flush=True)
-        e, w, ms = ours(a.tracker, folder, body)
+        e, w, ms = ours(a.bench, a.data, scene)
         print(f"| | this project | {e:.1f} | {w:.1f} | {ms:.1f} | {ms:.1f} |", flush=True)
 
 

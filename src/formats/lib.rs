@@ -14,10 +14,6 @@
 //! - GlTF, OBJ, MakeHuman: [`mod@gltf`], [`mod@obj`], [`mod@mhclo`].
 //! - Image size limits: [`mod@image::limits`].
 //!
-//! Contact of the offline cloth:
-//!
-//! - Queries with truth: [`mod@ccd_queries`], scored by `tools/bench/src/ccd.rs` (`tryon-bench ccd`).
-//!
 //! Wire and processes:
 //!
 //! - Compression of positions, keyframe or delta: [`mod@position_codec`].
@@ -25,7 +21,6 @@
 
 mod asf_amc;
 mod bvh;
-pub mod ccd_queries;
 mod error;
 pub mod fabric_json;
 mod foxglove;

@@ -1,6 +1,7 @@
 //! Recorded motion on any template: bone directions of a clip become stances.
 
 use super::routine::{Routine, ease};
+use super::settings::StanceSettings;
 use super::stance::{Limb, Rig, Stance};
 use nalgebra::{Matrix3, Rotation3, UnitQuaternion};
 use tryon_formats::MotionClip;
@@ -58,10 +59,6 @@ const NAMES: [(&str, &[&str]); 8] = [
         &["?fingers", "?Mid1", "finger3-1.?", "*HandMiddle1"],
     ),
 ];
-
-/// Held at the start, then blended into the clip, seconds: time for a tracker to measure the body.
-const HOLD: f64 = 1.0;
-const BLEND: f64 = 1.0;
 
 /// Frame with x to the left of the body and y as near to `up` as can be.
 fn basis(left: V3d, up: V3d) -> Option<UnitQuaternion<f64>> {
@@ -141,21 +138,17 @@ impl Performance {
     /// Stance at `t`: calibration pose, blend, then the clip.
     pub(super) fn stance(&self, rig: &Rig, home: P3d, t: f64) -> Stance {
         let still = || Routine::Still.stance(rig, home, t);
-        if t < HOLD {
+        let StanceSettings { hold, blend, .. } = rig.settings;
+        if t < hold {
             return still();
         }
-        let clip = self.clip_stance(rig, home, t - HOLD - BLEND);
-        let s = ease((t - HOLD) / BLEND);
+        let clip = self.clip_stance(rig, home, t - hold - blend);
+        let s = ease((t - hold) / blend);
         if s < 1.0 {
             still().blend(&clip, s)
         } else {
             clip
         }
-    }
-
-    /// Stance after a share of the clip, 0 to 1.
-    pub(super) fn moment(&self, rig: &Rig, share: f64) -> Stance {
-        self.clip_stance(rig, P3d::origin(), share * self.clip.seconds())
     }
 
     fn clip_stance(&self, rig: &Rig, home: P3d, t: f64) -> Stance {

@@ -1,7 +1,7 @@
 //! Appearance of the synthetic actor: colours by region of the rest body.
 
-use tryon_body::parts::{BodyParts, BodySegment};
-use tryon_body::{RestBody, Skeleton, SkinWeights};
+use tryon_body::parts::BodySegment;
+use tryon_body::{RestBody, Template};
 use tryon_geometry::math::{P3, V3};
 
 /// Colours of an actor, sRGB.
@@ -74,18 +74,14 @@ const EAR: f32 = 0.074;
 const HEAD_LENGTH: f32 = 0.162;
 
 impl Paint {
-    pub(super) fn new(
-        skeleton: &Skeleton,
-        weights: &SkinWeights,
-        rest: &RestBody,
-        colors: Colors,
-    ) -> Self {
+    pub(super) fn new(template: &Template, rest: &RestBody, colors: Colors) -> Self {
+        let (skeleton, weights) = (template.skeleton(), template.weights());
         let joint = |name: &str| {
             skeleton
                 .index(name)
                 .map_or(V3::zeros(), |j| rest.joints[j].coords.cast::<f32>())
         };
-        let parts = BodyParts::new(skeleton);
+        let parts = template.parts();
         let region = |i: usize| {
             use BodySegment::*;
             match parts.segment(weights.dominant(i)) {

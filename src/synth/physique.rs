@@ -1,5 +1,6 @@
 //! Physiques far outside the embedded body's shape space: morphs of a base body, bends, bellies and worn coverings.
 
+use super::settings::CoveringSettings;
 use tryon_body::import::template_from_smpl;
 use tryon_body::parts::{BodyPart, BodySegment};
 use tryon_body::{BodyError, BoneTransforms, Pose, RestBody, Template, skin};
@@ -45,15 +46,8 @@ pub struct Physique {
     pub covering: Option<Covering>,
 }
 
-/// Share of the stoop of each joint of the spine; the neck takes [`NECK`] of it back.
+/// Share of the stoop of each joint of the spine.
 const SPINE: [(&str, f64); 3] = [("spine1", 0.25), ("spine2", 0.4), ("spine3", 0.35)];
-const NECK: f64 = -0.8;
-/// Passes of smoothing of a covering's thickness along the surface.
-const SMOOTHING: usize = 12;
-/// Thickness of a coat, metres: trunk and hips, thighs, shins' upper part, arms.
-const COAT: [f32; 3] = [0.07, 0.10, 0.04];
-/// Thickness of hair on the skull and where it falls on neck and back, metres.
-const HAIR: [f32; 2] = [0.035, 0.065];
 
 impl Physique {
     /// No change.
@@ -226,7 +220,11 @@ fn stoop(template: &Template, angle: f64, arrays: &mut SmplArrays) {
     for (name, share) in SPINE {
         pose.set(skeleton, name, &[share * angle, 0.0, 0.0]);
     }
-    pose.set(skeleton, "neck", &[NECK * angle, 0.0, 0.0]);
+    pose.set(
+        skeleton,
+        "neck",
+        &[CoveringSettings::default().neck * angle, 0.0, 0.0],
+    );
     let mut bones = BoneTransforms::default();
     pose.bones(skeleton, &rest, &mut bones);
     let mut vertices = Vec::new();
@@ -239,6 +237,12 @@ fn stoop(template: &Template, angle: f64, arrays: &mut SmplArrays) {
 
 /// The surface of a covering over a body.
 fn cover(template: &Template, covering: Covering) -> Vec<P3> {
+    let CoveringSettings {
+        coat,
+        hair,
+        smoothing,
+        ..
+    } = CoveringSettings::default();
     let rest = template.personalise(&Default::default());
     let body = Morph::new(template, &rest);
     let height = body.stature();
@@ -252,9 +256,9 @@ fn cover(template: &Template, covering: Covering) -> Vec<P3> {
         match covering {
             Covering::WideCoat => {
                 let hem = ((p.y - knee.y) / 0.05).clamp(0.0, 1.0);
-                COAT[0] * of(&[Pelvis, Abdomen, Chest])
-                    + COAT[1] * of(&[Thigh]) * hem
-                    + COAT[2] * of(&[Collar, UpperArm, Forearm])
+                coat[0] * of(&[Pelvis, Abdomen, Chest])
+                    + coat[1] * of(&[Thigh]) * hem
+                    + coat[2] * of(&[Collar, UpperArm, Forearm])
             }
             Covering::LongHair => {
                 let behind = ((head.z + 0.05 - p.z) / 0.03).clamp(0.0, 1.0);
@@ -264,13 +268,13 @@ fn cover(template: &Template, covering: Covering) -> Vec<P3> {
                 let upper = ((p.y - 0.70 * height) / 0.05).clamp(0.0, 1.0);
                 let back = ((head.z - p.z) / 0.03).clamp(0.0, 1.0);
                 let falls = of(&[Neck, Chest, Collar]) * middle * upper * back;
-                HAIR[0] * skull + HAIR[1] * falls.max(of(&[Neck]) * back)
+                hair[0] * skull + hair[1] * falls.max(of(&[Neck]) * back)
             }
         }
     };
     let mut depth: Vec<f32> = (0..rest.vertices.len()).map(thickness).collect();
     let around = template.topology().vertex_neighbours();
-    for _ in 0..SMOOTHING {
+    for _ in 0..smoothing {
         depth = smoothed(Par::Seq, around, &depth);
     }
     let vertices = template.mesh().vertices();

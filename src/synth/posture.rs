@@ -1,6 +1,6 @@
 //! Postures that people take without being asked: held still, in directions of bones.
 
-use super::stance::{Limb, Rig, Stance};
+use super::stance::{Limb, Rig, Stance, limb};
 use nalgebra::UnitQuaternion;
 use tryon_geometry::math::{P3d, V3d};
 
@@ -32,64 +32,29 @@ const fn v(x: f64, y: f64, z: f64) -> V3d {
 /// Directions of upper arm, forearm and hand as if both arms were left: x outward, y up, z forward.
 type ArmDirections = [Limb; 2];
 
-const HANGING: Limb = [
-    v(0.20, -0.97, -0.05),
-    v(0.14, -0.97, 0.20),
-    v(0.08, -0.96, 0.24),
-];
-const JOINED: Limb = [
-    v(0.36, -0.86, 0.36),
-    v(-0.70, 0.28, 0.66),
-    v(-0.52, 0.66, 0.54),
-];
+const HANGING: Limb = limb([0.2, -0.97, -0.05], [0.14, -0.97, 0.2], [0.08, -0.96, 0.24]);
+const JOINED: Limb = limb([0.36, -0.86, 0.36], [-0.7, 0.28, 0.66], [-0.52, 0.66, 0.54]);
 /// Forearm across the chest, in front of the other.
-const CROSSED_OUTER: Limb = [
-    v(0.02, -0.84, 0.54),
-    v(-0.93, 0.22, 0.28),
-    v(-0.96, 0.16, -0.22),
-];
+const CROSSED_OUTER: Limb = limb(
+    [0.02, -0.84, 0.54],
+    [-0.93, 0.22, 0.28],
+    [-0.96, 0.16, -0.22],
+);
 /// Forearm across the chest, behind the other and lower.
-const CROSSED_INNER: Limb = [
-    v(0.04, -0.92, 0.38),
-    v(-0.95, 0.10, 0.28),
-    v(-0.98, 0.06, -0.10),
-];
-const ON_HIP: Limb = [
-    v(0.66, -0.72, -0.22),
-    v(-0.52, -0.64, 0.56),
-    v(-0.25, -0.55, 0.79),
-];
-const STRAIGHT_UP: Limb = [
-    v(0.26, 0.96, 0.06),
-    v(0.06, 0.99, 0.12),
-    v(0.04, 0.99, 0.08),
-];
-const FOREARM_ON_KNEE: Limb = [
-    v(0.20, -0.62, 0.76),
-    v(-0.10, -0.40, 0.91),
-    v(-0.10, -0.62, 0.78),
-];
+const CROSSED_INNER: Limb = limb([0.04, -0.92, 0.38], [-0.95, 0.1, 0.28], [-0.98, 0.06, -0.1]);
+const ON_HIP: Limb = limb(
+    [0.66, -0.72, -0.22],
+    [-0.52, -0.64, 0.56],
+    [-0.25, -0.55, 0.79],
+);
+const STRAIGHT_UP: Limb = limb([0.26, 0.96, 0.06], [0.06, 0.99, 0.12], [0.04, 0.99, 0.08]);
+const FOREARM_ON_KNEE: Limb = limb([0.2, -0.62, 0.76], [-0.1, -0.4, 0.91], [-0.1, -0.62, 0.78]);
 
-const ON_THIGH: Limb = [
-    v(0.14, -0.95, 0.28),
-    v(-0.05, -0.42, 0.90),
-    v(-0.05, -0.30, 0.95),
-];
-
-/// Half distance between the feet, metres; wider where the posture needs it.
-const HALF_STANCE: f64 = 0.125;
-const HALF_SQUAT: f64 = 0.19;
-/// Height of the hips over the ankles in a squat, share of the leg: thighs a little above level.
-const SQUAT: f64 = 0.50;
-/// Height of a knee joint over the floor that it rests on, metres.
-const KNEE_RADIUS: f64 = 0.055;
-/// Turn of the kneeling foot about the body's x axis, radians: instep to the floor.
-const TOES_BACK: f64 = 2.6;
-/// Height of the root joint of somebody seated, metres: 10 cm above the seat of a chair.
-const SEATED: f64 = 0.57;
-/// Lean of the trunk in squat and kneel, degrees.
-const SQUAT_LEAN: f64 = 24.0;
-const KNEEL_LEAN: f64 = 6.0;
+const ON_THIGH: Limb = limb(
+    [0.14, -0.95, 0.28],
+    [-0.05, -0.42, 0.9],
+    [-0.05, -0.3, 0.95],
+);
 
 impl Posture {
     /// All of them.
@@ -117,10 +82,11 @@ impl Posture {
         }
     }
 
-    fn lean(self) -> f64 {
+    fn lean(self, rig: &Rig) -> f64 {
+        let [squat, kneel] = rig.settings.leans;
         match self {
-            Self::Crouching => SQUAT_LEAN,
-            Self::OneKnee => KNEEL_LEAN,
+            Self::Crouching => squat,
+            Self::OneKnee => kneel,
             _ => 0.0,
         }
         .to_radians()
@@ -133,11 +99,13 @@ impl Posture {
             let mirror = if s == 0 { 1.0 } else { -1.0 };
             self.arms()[s].map(|d| v(mirror * d.x, d.y, d.z).normalize())
         };
+        let (settings, lean) = (&rig.settings, self.lean(rig));
+        let (half, squat) = (settings.half_stance, settings.half_squat);
         let mut stance = Stance {
             pelvis: P3d::new(home.x, 0.0, home.z),
             heading: UnitQuaternion::identity(),
-            chest: v(self.lean(), 0.0, 0.0),
-            head: v(-0.7 * self.lean(), 0.0, 0.0),
+            chest: v(lean, 0.0, 0.0),
+            head: v(-0.7 * lean, 0.0, 0.0),
             arms: [side(0), side(1)],
             legs: [down, down],
             feet: [UnitQuaternion::identity(); 2],
@@ -145,24 +113,18 @@ impl Posture {
         let sole = |x: f64, z: f64| (home + v(x, 0.0, z), 0.0);
         match self {
             Self::Crouching => {
-                let soles = [sole(HALF_SQUAT, 0.06), sole(-HALF_SQUAT, 0.06)];
-                stance.pelvis.y = rig.ankle_height() + SQUAT * rig.leg_length();
+                let soles = [sole(squat, 0.06), sole(-squat, 0.06)];
+                stance.pelvis.y = rig.ankle_height() + settings.squat * rig.leg_length();
                 stance.pelvis.z -= 0.12;
                 rig.plant(&mut stance, soles);
             }
             Self::OneKnee => kneel(rig, home, &mut stance),
             Self::Sitting => {
                 let ahead = rig.thigh_length();
-                stance.pelvis.y = SEATED;
-                rig.plant(
-                    &mut stance,
-                    [sole(HALF_STANCE, ahead), sole(-HALF_STANCE, ahead)],
-                );
+                stance.pelvis.y = settings.seated;
+                rig.plant(&mut stance, [sole(half, ahead), sole(-half, ahead)]);
             }
-            _ => rig.stand(
-                &mut stance,
-                [sole(HALF_STANCE, 0.0), sole(-HALF_STANCE, 0.0)],
-            ),
+            _ => rig.stand(&mut stance, [sole(half, 0.0), sole(-half, 0.0)]),
         }
         stance
     }
@@ -170,12 +132,13 @@ impl Posture {
 
 /// Right knee and toes on the floor, left sole in front.
 fn kneel(rig: &Rig, home: P3d, stance: &mut Stance) {
+    let settings = &rig.settings;
     let thigh = rig.thigh_length();
     let hip = rig.hip_center(&stance.heading);
-    stance.pelvis.y = KNEE_RADIUS + thigh - hip.y;
-    let front = (home + v(HALF_STANCE, 0.0, 0.9 * thigh), 0.0);
+    stance.pelvis.y = settings.knee_radius + thigh - hip.y;
+    let front = (home + v(settings.half_stance, 0.0, 0.9 * thigh), 0.0);
     rig.plant(stance, [front, (home, 0.0)]);
-    let toes_back = UnitQuaternion::from_axis_angle(&V3d::x_axis(), TOES_BACK);
+    let toes_back = UnitQuaternion::from_axis_angle(&V3d::x_axis(), settings.toes_back);
     stance.feet[1] = toes_back;
     stance.legs[1] = [
         v(0.0, -1.0, 0.02).normalize(),

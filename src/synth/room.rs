@@ -14,6 +14,12 @@ pub struct Room {
     pub wall: [u8; 3],
     /// Mean colour of the floor, sRGB.
     pub floor: [u8; 3],
+    /// Width of a floor board, metres.
+    pub board: f64,
+    /// Height of the skirting, metres.
+    pub skirting: f64,
+    /// A framed picture on the back wall: x from, to, y from, to, metres.
+    pub picture: [f64; 4],
 }
 
 impl Default for Room {
@@ -23,6 +29,9 @@ impl Default for Room {
             left_x: -2.1,
             wall: [196, 194, 188],
             floor: [150, 112, 76],
+            board: 0.12,
+            skirting: 0.09,
+            picture: [0.75, 1.30, 1.15, 1.85],
         }
     }
 }
@@ -37,12 +46,6 @@ pub(super) struct Background {
     /// Pixels that see the floor: index and world x, z.
     pub(super) floor: Vec<(u32, [f32; 2])>,
 }
-
-/// Width of a floor board and height of the skirting, metres.
-const BOARD: f64 = 0.12;
-const SKIRTING: f64 = 0.09;
-/// A framed picture on the back wall: x from, to, y from, to, metres.
-const PICTURE: [f64; 4] = [0.75, 1.30, 1.15, 1.85];
 
 /// Hash of a cell to [0, 1), for the texture of boards and plaster.
 fn speckle(a: i64, b: i64) -> f64 {
@@ -105,12 +108,12 @@ impl Room {
             } else if t == back {
                 (
                     room.wall_color(&p),
-                    wall_shade(p.x, p.y, p.x - room.left_x, pixel),
+                    room.wall_shade([p.x, p.y], p.x - room.left_x, pixel),
                 )
             } else {
                 (
                     room.wall,
-                    0.86 * wall_shade(p.z, p.y, p.z - room.back_z, pixel),
+                    0.86 * room.wall_shade([p.z, p.y], p.z - room.back_z, pixel),
                 )
             };
             out.depth[i] = t as f32;
@@ -122,7 +125,7 @@ impl Room {
     }
 
     fn wall_color(&self, p: &P3d) -> [u8; 3] {
-        let [x0, x1, y0, y1] = PICTURE;
+        let [x0, x1, y0, y1] = self.picture;
         let inside = |m: f64| (x0 + m..x1 - m).contains(&p.x) && (y0 + m..y1 - m).contains(&p.y);
         if inside(0.05) {
             let s = (p.y - y0) / (y1 - y0) + 0.12 * (9.0 * p.x).sin();
@@ -142,35 +145,35 @@ impl Room {
     }
 
     fn floor_shade(&self, p: &P3d, pixel: f64) -> f64 {
-        let row = (p.x / BOARD).floor();
+        let row = (p.x / self.board).floor();
         let end = ((p.z + 1.7 * speckle(row as i64, 5)) / 1.1).floor();
         let tint = 0.90 + 0.16 * speckle(row as i64, end as i64);
         let grain =
             0.04 * ((p.x * 310.0 + 3.0 * (p.z * 4.0).sin()).sin()) * (1.0 - pixel / 0.01).max(0.0);
-        let from_edge = (p.x / BOARD - row).min(row + 1.0 - p.x / BOARD) * BOARD;
+        let from_edge = (p.x / self.board - row).min(row + 1.0 - p.x / self.board) * self.board;
         let gap = 0.35 * (1.0 - from_edge / 0.004).max(0.0) * (1.0 - pixel / 0.012).max(0.0);
         // Ambient occlusion of the corners.
         let corner =
             0.25 * (-(p.z - self.back_z) / 0.35).exp() + 0.2 * (-(p.x - self.left_x) / 0.35).exp();
         (tint + grain - gap) * (1.0 - corner) * 0.95
     }
-}
 
-fn wall_shade(along: f64, y: f64, to_corner: f64, pixel: f64) -> f64 {
-    let plaster =
-        0.03 * (speckle((along / 0.012).floor() as i64, (y / 0.012).floor() as i64) - 0.5);
-    let plaster = plaster * (1.0 - pixel / 0.012).max(0.0);
-    let light = 0.80 + 0.12 * (y / 2.4).clamp(0.0, 1.0);
-    let corner = 0.18 * (-to_corner.max(0.0) / 0.4).exp() + 0.15 * (-y.max(0.0) / 0.25).exp();
-    if y < SKIRTING {
-        // A lighter board with a dark line above.
-        return if y > SKIRTING - 0.008 {
-            0.70
-        } else {
-            1.05 - corner
-        };
+    fn wall_shade(&self, [along, y]: [f64; 2], to_corner: f64, pixel: f64) -> f64 {
+        let plaster =
+            0.03 * (speckle((along / 0.012).floor() as i64, (y / 0.012).floor() as i64) - 0.5);
+        let plaster = plaster * (1.0 - pixel / 0.012).max(0.0);
+        let light = 0.80 + 0.12 * (y / 2.4).clamp(0.0, 1.0);
+        let corner = 0.18 * (-to_corner.max(0.0) / 0.4).exp() + 0.15 * (-y.max(0.0) / 0.25).exp();
+        if y < self.skirting {
+            // A lighter board with a dark line above.
+            return if y > self.skirting - 0.008 {
+                0.70
+            } else {
+                1.05 - corner
+            };
+        }
+        light + plaster - corner
     }
-    light + plaster - corner
 }
 
 #[cfg(test)]

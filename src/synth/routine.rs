@@ -1,7 +1,8 @@
 //! Routines of the synthetic actor: keyframes of torso and arms, a path for the pelvis, feet that step under it.
 
 use super::posture::Posture;
-use super::stance::{Limb, Rig, Stance};
+use super::settings::StanceSettings;
+use super::stance::{Limb, Rig, Stance, limb};
 use nalgebra::UnitQuaternion;
 use tryon_geometry::math::{P3d, V3d, exp_so3};
 
@@ -46,47 +47,31 @@ const fn v(x: f64, y: f64, z: f64) -> V3d {
 }
 
 /// The calibration pose: arms 45° down with elbows almost straight.
-const A: Limb = [
-    v(0.72, -0.69, 0.0),
-    v(0.68, -0.70, 0.18),
-    v(0.66, -0.70, 0.18),
-];
+const A: Limb = limb([0.72, -0.69, 0.0], [0.68, -0.7, 0.18], [0.66, -0.7, 0.18]);
 /// Hanging loosely, clear of the hips.
-const DOWN: Limb = [
-    v(0.34, -0.93, -0.06),
-    v(0.24, -0.93, 0.24),
-    v(0.12, -0.95, 0.26),
-];
+const DOWN: Limb = limb(
+    [0.34, -0.93, -0.06],
+    [0.24, -0.93, 0.24],
+    [0.12, -0.95, 0.26],
+);
 /// Straight out to the side.
-const SIDE: Limb = [
-    v(0.99, -0.02, 0.04),
-    v(0.97, 0.02, 0.22),
-    v(0.98, 0.0, 0.18),
-];
+const SIDE: Limb = limb([0.99, -0.02, 0.04], [0.97, 0.02, 0.22], [0.98, 0.0, 0.18]);
 /// Up and out.
-const UP: Limb = [
-    v(0.62, 0.76, 0.12),
-    v(0.40, 0.88, 0.22),
-    v(0.36, 0.92, 0.14),
-];
+const UP: Limb = limb([0.62, 0.76, 0.12], [0.4, 0.88, 0.22], [0.36, 0.92, 0.14]);
 /// Hand on the hip, elbow out.
-const HIP: Limb = [
-    v(0.66, -0.72, -0.22),
-    v(-0.52, -0.64, 0.56),
-    v(-0.25, -0.55, 0.79),
-];
+const HIP: Limb = limb(
+    [0.66, -0.72, -0.22],
+    [-0.52, -0.64, 0.56],
+    [-0.25, -0.55, 0.79],
+);
 /// Forearm across the belly, a hand's breadth in front of it.
-const ACROSS: Limb = [
-    v(0.26, -0.88, 0.40),
-    v(-0.72, 0.16, 0.67),
-    v(-0.97, 0.16, 0.16),
-];
+const ACROSS: Limb = limb([0.26, -0.88, 0.4], [-0.72, 0.16, 0.67], [-0.97, 0.16, 0.16]);
 /// Hand at the hem of the shirt.
-const HEM: Limb = [
-    v(0.44, -0.88, -0.10),
-    v(-0.30, -0.66, 0.68),
-    v(-0.40, -0.84, 0.36),
-];
+const HEM: Limb = limb(
+    [0.44, -0.88, -0.1],
+    [-0.3, -0.66, 0.68],
+    [-0.4, -0.84, 0.36],
+);
 
 /// Turn of the body and posture of chest and head.
 #[derive(Clone, Copy)]
@@ -181,15 +166,6 @@ const LEAVE: [Key; 8] = [
     key(12.0, FRONT, [A; 2]),
 ];
 
-/// One step with each foot takes this long, seconds: an unhurried 100 steps a minute.
-const CYCLE: f64 = 1.2;
-/// Share of the cycle that a foot is in the air.
-const SWING: f64 = 0.4;
-/// Height of a foot in mid-swing as a share of the step, and at most, metres.
-const LIFT: [f64; 2] = [0.25, 0.07];
-/// Half distance between the feet, metres.
-const HALF_STANCE: f64 = 0.125;
-
 /// Rises from 0 to 1 with speed and acceleration zero at both ends.
 pub(super) fn ease(x: f64) -> f64 {
     let t = x.clamp(0.0, 1.0);
@@ -246,14 +222,21 @@ impl Routine {
     }
 
     /// Point under the ankle and yaw of a foot at `t`: planted under the pelvis of mid-stance, swinging between.
-    fn sole(self, side: usize, t: f64) -> (P3d, f64) {
-        let phase = t / CYCLE - 0.5 * side as f64;
+    fn sole(self, settings: &StanceSettings, side: usize, t: f64) -> (P3d, f64) {
+        let StanceSettings {
+            cycle,
+            swing,
+            lift: [share, most],
+            half_stance,
+            ..
+        } = *settings;
+        let phase = t / cycle - 0.5 * side as f64;
         let (round, part) = (phase.floor(), phase.rem_euclid(1.0));
         let planted = |round: f64| {
             // Middle of the stance that ends the cycle.
-            let k = self.key(((round + 0.5 * (1.0 + SWING) + 0.5 * side as f64) * CYCLE).max(0.0));
+            let k = self.key(((round + 0.5 * (1.0 + swing) + 0.5 * side as f64) * cycle).max(0.0));
             let yaw = k.yaw.to_radians();
-            let out = if side == 0 { HALF_STANCE } else { -HALF_STANCE };
+            let out = if side == 0 { half_stance } else { -half_stance };
             (
                 P3d::new(
                     k.place[0] + out * yaw.cos(),
@@ -264,9 +247,9 @@ impl Routine {
             )
         };
         let (from, to) = (planted(round - 1.0), planted(round));
-        let s = ease(part / SWING);
+        let s = ease(part / swing);
         let step = (to.0 - from.0).norm() + 0.1 * (to.1 - from.1).abs();
-        let lift = (LIFT[0] * step).min(LIFT[1]) * 4.0 * s * (1.0 - s);
+        let lift = (share * step).min(most) * 4.0 * s * (1.0 - s);
         (
             from.0 + (to.0 - from.0) * s + V3d::y() * lift,
             from.1 + (to.1 - from.1) * s,
@@ -314,7 +297,7 @@ impl Routine {
             feet: [UnitQuaternion::identity(); 2],
         };
         let soles = [0, 1].map(|s| {
-            let (p, yaw) = self.sole(s, t.rem_euclid(self.period()));
+            let (p, yaw) = self.sole(&rig.settings, s, t.rem_euclid(self.period()));
             (home + p.coords, yaw)
         });
         rig.stand(&mut stance, soles);
@@ -339,9 +322,10 @@ mod tests {
     #[test]
     fn standing_feet_stay_where_they_are() {
         for i in 0..45 {
-            let (p, _) = Routine::TryOn.sole(1, f64::from(i) / 30.0);
+            let settings = StanceSettings::default();
+            let (p, _) = Routine::TryOn.sole(&settings, 1, f64::from(i) / 30.0);
             assert!(
-                (p - P3d::new(-HALF_STANCE, 0.0, 0.0)).norm() < 1e-9,
+                (p - P3d::new(-settings.half_stance, 0.0, 0.0)).norm() < 1e-9,
                 "frame {i}: {p}"
             );
         }

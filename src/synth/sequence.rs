@@ -6,6 +6,7 @@ use super::paint::{Colors, Paint};
 use super::posture::Posture;
 use super::room::{Background, Room};
 use super::routine::Routine;
+use super::settings::LightSettings;
 use super::stance::Rig;
 use nalgebra::UnitQuaternion;
 use std::sync::Arc;
@@ -135,16 +136,6 @@ pub struct Sequence {
     performance: Option<Arc<Performance>>,
 }
 
-/// Light from above, in front and a little from the left; and a weak one from the right. World frame.
-const KEY_LIGHT: [f64; 3] = [-0.45, 0.75, 0.55];
-const FILL_LIGHT: [f64; 3] = [0.8, 0.2, 0.5];
-/// Shares of ambient light, light from above, key light and fill light.
-const SHADE: [f32; 4] = [0.42, 0.10, 0.52, 0.14];
-/// Radius of the shadow under a foot and under the body, metres.
-const SHADOW: [f32; 2] = [0.16, 0.55];
-/// Darkness of these shadows in their middle.
-const SHADOW_DEPTH: [f32; 2] = [0.45, 0.30];
-
 /// The room, with a chair under somebody who sits.
 fn background(setting: &Setting) -> Background {
     let (camera, place) = (&setting.camera, &setting.world_from_camera);
@@ -166,12 +157,7 @@ impl Sequence {
         let rest = t.personalise(&actor.shape);
         Self {
             rig: Rig::new(t.skeleton(), &rest),
-            paint: Paint::new(
-                t.skeleton(),
-                t.weights(),
-                &rest,
-                Colors::pick(actor.appearance),
-            ),
+            paint: Paint::new(t, &rest, Colors::pick(actor.appearance)),
             background: background(&setting),
             calibration: Calibration::registered(setting.camera),
             rest,
@@ -188,6 +174,10 @@ impl Sequence {
     pub fn with_clip(mut self, clip: MotionClip) -> Result<Self, ClipError> {
         self.performance = Some(Arc::new(Performance::new(clip)?));
         Ok(self)
+    }
+    /// Time before a clip plays, seconds: calibration pose and blend.
+    pub fn clip_lead(&self) -> f64 {
+        self.rig.settings.hold + self.rig.settings.blend
     }
     /// Camera, room and routine.
     pub fn setting(&self) -> &Setting {
@@ -227,13 +217,8 @@ impl Sequence {
         let present = self.performance.is_some() || self.setting.routine.has_person();
         let mut vertices = Vec::new();
         if present {
-            skin(
-                Par::Seq,
-                &self.rest.vertices,
-                t.weights(),
-                &bones,
-                &mut vertices,
-            );
+            let (rest, weights) = (&self.rest.vertices, t.weights());
+            skin(Par::Seq, rest, weights, &bones, &mut vertices);
         }
         Truth {
             present,
@@ -291,27 +276,19 @@ impl Sequence {
             near: NEAR,
         };
         let mut buffer = VisibilityBuffer::default();
-        rasterise_with(
-            Options {
-                par: Par::Seq,
-                cull: Cull::Back,
-                ..Options::default()
-            },
-            &view,
-            &truth.vertices,
-            faces,
-            &mut buffer,
-        );
+        let options = Options {
+            par: Par::Seq,
+            cull: Cull::Back,
+            ..Options::default()
+        };
+        let vertices = &truth.vertices;
+        rasterise_with(options, &view, vertices, faces, &mut buffer);
         let mut normals = Vec::new();
         if color.is_some() {
-            vertex_normals(
-                Par::Seq,
-                &truth.vertices,
-                faces,
-                t.topology().vertex_faces(),
-                &mut normals,
-            );
+            let around = t.topology().vertex_faces();
+            vertex_normals(Par::Seq, vertices, faces, around, &mut normals);
         }
+        let settings = LightSettings::default();
         let camera_from_world = self.setting.world_from_camera.inverse();
         let light = |d: [f64; 3]| {
             camera_from_world
@@ -319,7 +296,11 @@ impl Sequence {
                 .normalize()
                 .cast::<f32>()
         };
-        let (key, fill, up) = (light(KEY_LIGHT), light(FILL_LIGHT), light([0.0, 1.0, 0.0]));
+        let (key, fill, up) = (
+            light(settings.key),
+            light(settings.fill),
+            light([0.0, 1.0, 0.0]),
+        );
         let mut color = color;
         let width = buffer.width as usize;
         for (i, (&id, &z)) in buffer.face.iter().zip(&buffer.depth).enumerate() {
@@ -331,7 +312,7 @@ impl Sequence {
                 continue;
             };
             let f = faces[id as usize];
-            let corners = f.map(|k| truth.vertices[k as usize]);
+            let corners = f.map(|k| vertices[k as usize]);
             let w = barycentrics(&view, corners, (i % width) as f32, (i / width) as f32)
                 .unwrap_or([1.0, 0.0, 0.0]);
             let mix = |a: V3, b: V3, c: V3| a * w[0] + b * w[1] + c * w[2];
@@ -345,7 +326,7 @@ impl Sequence {
             };
             let base = self.paint.color(f[nearest], &P3::from(rest));
             let n = n / n.norm().max(f32::EPSILON);
-            let [ambient, sky, key_share, fill_share] = SHADE;
+            let [ambient, sky, key_share, fill_share] = settings.shade;
             let shade = ambient
                 + sky * n.dot(&up)
                 + key_share * n.dot(&key).max(0.0)
@@ -366,10 +347,15 @@ impl Sequence {
                 .point(&truth.joints[skeleton.index(name).unwrap_or(0)]);
             [p.x as f32, p.z as f32]
         };
+        let LightSettings {
+            shadow,
+            shadow_depth,
+            ..
+        } = LightSettings::default();
         let spots = [
-            (over("left_foot"), SHADOW[0], SHADOW_DEPTH[0]),
-            (over("right_foot"), SHADOW[0], SHADOW_DEPTH[0]),
-            (over("pelvis"), SHADOW[1], SHADOW_DEPTH[1]),
+            (over("left_foot"), shadow[0], shadow_depth[0]),
+            (over("right_foot"), shadow[0], shadow_depth[0]),
+            (over("pelvis"), shadow[1], shadow_depth[1]),
         ];
         for &(i, at) in &self.background.floor {
             let mut light = 1.0f32;

@@ -3,25 +3,13 @@
 use super::furniture::{NEAR, Piece, hand};
 use super::room::Room;
 use super::sequence::Setting;
+use super::settings::ShopSettings;
 use rand::{Rng, SeedableRng};
 use tryon_geometry::camera::NoiseModel;
 use tryon_geometry::math::{P3, P3d, V3d};
 
 /// People that stand before the camera at most.
 pub const PLACES: usize = 3;
-/// Distance of the first place from the camera, metres.
-const AWAY: [f64; 2] = [1.0, 4.0];
-/// Height of the camera, metres.
-const HEIGHT: [f64; 2] = [0.8, 2.1];
-/// Roll of the camera to either side, degrees.
-const ROLL: f64 = 4.0;
-/// Clearance between furniture and a place where somebody stands, metres.
-const CLEARANCE: f64 = 0.55;
-/// Pieces of a room, and trials to place each.
-const PIECES: [usize; 2] = [5, 9];
-const TRIALS: usize = 60;
-/// Heights on the axis of a piece of which one must be in view, metres.
-const HEIGHTS: [f64; 3] = [0.3, 0.9, 1.4];
 /// Frames in which a hand is before the lens.
 const HAND_FRAMES: std::ops::Range<u64> = 24..44;
 const SEED: u64 = 0x5eed_0005;
@@ -29,6 +17,7 @@ const SEED: u64 = 0x5eed_0005;
 /// A furnished room and its camera. The same number is the same room.
 #[derive(Clone, Debug)]
 pub struct Shop {
+    settings: ShopSettings,
     setting: Setting,
     places: [P3d; PLACES],
     pieces: Vec<Piece>,
@@ -41,17 +30,19 @@ impl Shop {
     /// Room of this number. Every fourth camera is mounted upright, with its image turned back or left lying by turns;
     /// every third room has a mannequin, every other a rack.
     pub fn new(number: u64) -> Self {
+        let settings = ShopSettings::default();
         let mut rng = rand_pcg::Pcg32::seed_from_u64(SEED + number);
         let is_upright = number.is_multiple_of(4);
         let is_lying = number.is_multiple_of(8);
-        let mut away = rng.random_range(AWAY[0]..AWAY[1]);
+        let mut away = rng.random_range(settings.away[0]..settings.away[1]);
         if !is_upright {
             away = away.max(1.3);
         }
-        let height = rng.random_range(HEIGHT[0]..HEIGHT[1]);
+        let height = rng.random_range(settings.height[0]..settings.height[1]);
         // Looks at the chest of a standing person.
         let down = ((height - 1.15) / away).atan().to_degrees() + rng.random_range(-3.0..5.0);
-        let roll = rng.random_range(-ROLL..ROLL) + if is_lying { 90.0 } else { 0.0 };
+        let roll =
+            rng.random_range(-settings.roll..settings.roll) + if is_lying { 90.0 } else { 0.0 };
         let room = Room {
             back_z: -(away + rng.random_range(1.3..2.8)),
             left_x: -rng.random_range(1.5..2.6),
@@ -86,6 +77,7 @@ impl Shop {
             ),
         ];
         let mut shop = Self {
+            settings,
             depth: Room::draw(
                 setting.room.as_ref(),
                 &setting.camera,
@@ -150,7 +142,7 @@ impl Shop {
         if number.is_multiple_of(2) {
             wanted.push(Piece::Rack);
         }
-        let count = rng.random_range(PIECES[0]..=PIECES[1]);
+        let count = rng.random_range(self.settings.pieces[0]..=self.settings.pieces[1]);
         while wanted.len() < count {
             wanted.push(Piece::ALL[rng.random_range(0..Piece::ALL.len())]);
         }
@@ -189,12 +181,12 @@ impl Shop {
     ) -> Option<P3d> {
         let room = self.setting.room?;
         let home = self.setting.home;
-        for _ in 0..TRIALS {
+        for _ in 0..self.settings.trials {
             let z = rng.random_range(room.back_z + 0.35..-0.9);
             let x = rng.random_range(room.left_x + 0.4..2.2);
             let at = P3d::new(x, 0.0, z);
             let is_free = taken.iter().enumerate().all(|(k, (p, r))| {
-                let clearance = if k == 0 { CLEARANCE } else { 0.0 };
+                let clearance = if k == 0 { self.settings.clearance } else { 0.0 };
                 (p - at).norm() > radius + r.max(clearance)
             });
             // Between camera and people only the edge of the picture is used.
@@ -210,7 +202,7 @@ impl Shop {
     fn is_in_view(&self, at: &P3d) -> bool {
         let camera = &self.setting.camera;
         let (w, h) = (camera.width as f32, camera.height as f32);
-        HEIGHTS.iter().any(|y| {
+        self.settings.heights.iter().any(|y| {
             let world = at + V3d::new(0.0, *y, 0.0);
             let p = self.setting.world_from_camera.inverse().point(&world);
             let q = camera.project(&p.cast());

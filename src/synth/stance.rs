@@ -2,12 +2,21 @@
 //!
 //! Keyframes and motion clips give directions; [`Rig::pose`] finds the joint angles of a template for them.
 
+use super::settings::StanceSettings;
 use nalgebra::{Matrix3, Rotation3, Unit, UnitQuaternion};
 use tryon_body::{JointMotion, Pose, RestBody, Skeleton};
 use tryon_geometry::math::{P3d, Rigid, V3d, World, exp_so3, log_so3};
 
 /// Upper part, lower part and end of a limb as unit directions.
 pub(super) type Limb = [V3d; 3];
+
+/// Directions of a limb, to be normalised.
+pub(super) const fn limb(upper: [f64; 3], lower: [f64; 3], end: [f64; 3]) -> Limb {
+    const fn v([x, y, z]: [f64; 3]) -> V3d {
+        V3d::new(x, y, z)
+    }
+    [v(upper), v(lower), v(end)]
+}
 
 /// A person's configuration. Sides: `[left, right]`. World is y up, a person with yaw 0 faces +z.
 #[derive(Clone, Debug)]
@@ -85,13 +94,8 @@ pub(super) struct Rig {
     hips: [V3d; 2],
     /// Height of the ankle above the sole, metres.
     ankle_height: f64,
+    pub(super) settings: StanceSettings,
 }
-
-/// Longest leg over a straight one: knees of a straight leg have no direction to bend in.
-const SLACK: f64 = 0.997;
-
-/// Weight of the rest axis against the plane of the limb: a limb bent by less than about 3° has no plane.
-const STRAIGHT: f64 = 0.05;
 
 impl Rig {
     pub(super) fn new(skeleton: &Skeleton, rest: &RestBody) -> Self {
@@ -141,6 +145,7 @@ impl Rig {
                 .map(|s| at(&format!("{s}_hip")).map_or(V3d::zeros(), |j| rest.joints[j] - pelvis)),
             ankle_height: ankles[0].map_or(0.0, |j| rest.joints[j].y - floor),
             skeleton: skeleton.clone(),
+            settings: StanceSettings::default(),
         }
     }
 
@@ -177,7 +182,7 @@ impl Rig {
                 0.0,
                 stance.pelvis.z + hips[s].z - ankle.z,
             );
-            let reach = (leg.length[0] + leg.length[1]) * SLACK;
+            let reach = (leg.length[0] + leg.length[1]) * self.settings.slack;
             let up = (reach * reach - across.norm_squared()).max(0.0).sqrt();
             height = height.min(ankle.y + up - hips[s].y);
         }
@@ -199,7 +204,7 @@ impl Rig {
             let [a, b] = leg.length;
             let d = to
                 .norm()
-                .clamp((a - b).abs() + f64::EPSILON, (a + b) * SLACK);
+                .clamp((a - b).abs() + f64::EPSILON, (a + b) * self.settings.slack);
             let down = to.try_normalize(0.0).unwrap_or(-V3d::y());
             // The knee points halfway between the directions of pelvis and foot.
             let pole = stance.heading * V3d::z() + yaw * V3d::z();
@@ -263,7 +268,7 @@ impl Rig {
         let least = UnitQuaternion::rotation_between(&a, &d).unwrap_or_else(|| {
             UnitQuaternion::from_axis_angle(&Unit::new_normalize(limb.axis), std::f64::consts::PI)
         });
-        let axis = d.cross(&e) + least * limb.axis * STRAIGHT;
+        let axis = d.cross(&e) + least * limb.axis * self.settings.straight;
         let axis = (axis - d * axis.dot(&d))
             .try_normalize(0.0)
             .unwrap_or(least * limb.axis);

@@ -23,7 +23,7 @@ fn an_outfit_survives_a_dance_outside_the_body_and_unstretched() {
         edge: 0.022,
         config: Config::default(),
     };
-    let report = dance.run(&outfit, 10.0, |_, _, _| {}).unwrap();
+    let report = dance.run(&outfit, 10.0).unwrap();
     println!(
         "{} vertices, p99 strain {:.3}, penetration {:?} m",
         report.vertices, report.p99_strain, report.penetration

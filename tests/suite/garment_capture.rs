@@ -18,10 +18,9 @@ use tryon::formats::shared_data;
 use tryon::geometry::math::{P3, V3};
 use tryon::synth::{Posture, Routine};
 use tryon_bench::garment_capture::{
-    CaptureScene, CaptureVariant, CloudCell, capture_scenes, film_clouds, measure, measure_cloud,
-    measure_turn_scene, turn_scenes,
+    CaptureScene, capture_scenes, measure, measure_turn_scene, turn_scenes,
 };
-use tryon_bench::scans::{SKIN_LABEL, ScanMotion, ScanScene, TrueScan};
+use tryon_bench::scans::{CameraRig, SKIN_LABEL, ScanMotion, ScanScene, ScannerSetting, TrueScan};
 
 /// Unsigned bytes of an npy file.
 fn bytes_of_npy(path: &Path) -> Vec<u8> {
@@ -91,8 +90,7 @@ fn a_synthetic_outfit_meets_the_bars() {
     let scenes = capture_scenes().expect("scenes");
     let mut scene = scenes.into_iter().next().expect("a scene");
     scene.scene.scans = 2;
-    let whole = &CaptureVariant::all()[0];
-    let row = measure(&scene, whole, 3).expect("measured");
+    let row = measure(&scene, 3).expect("measured");
     let error = |name| row.get(name).unwrap_or(f64::NAN);
     println!("{row:?}");
     assert!(error("F1") > 0.93);
@@ -409,7 +407,7 @@ fn arms_against_the_torso_keep_labels_and_garments_apart() {
             start: 0.0,
         };
         (scene.scene.scans, scene.scene.scanner.points) = (1, 30_000);
-        let row = measure(&scene, &CaptureVariant::all()[0], 3).expect("measured");
+        let row = measure(&scene, 3).expect("measured");
         let error = |name| row.get(name).unwrap_or(f64::NAN);
         println!("{posture:?}: {row:?}");
         assert!(error("F1") > 0.95, "{posture:?}");
@@ -426,7 +424,7 @@ fn a_noisy_fused_cloud_without_normals_is_captured() {
     let fused = |s: &CaptureScene| s.name == "noisy fused cloud";
     let mut scene = scenes.into_iter().find(fused).expect("the scene");
     scene.scene.scans = 1;
-    let row = measure(&scene, &CaptureVariant::whole(), 3).expect("measured");
+    let row = measure(&scene, 3).expect("measured");
     println!("{row:?}");
     let error = |name| row.get(name).unwrap_or(f64::NAN);
     assert!(error("F1") > 0.95);
@@ -442,13 +440,23 @@ fn a_noisy_fused_cloud_without_normals_is_captured() {
 #[test]
 fn cameras_of_other_exposure_change_no_labels() {
     let scenes = capture_scenes().expect("scenes");
-    let heavy = scenes
-        .iter()
-        .find(|s| s.name == "heavy")
-        .expect("the scene");
-    let cells = &CloudCell::of_scene(2, 0)[..1];
-    let scan = film_clouds(heavy, cells).expect("filmed").remove(0);
-    let row = measure_cloud(heavy, &cells[0], scan);
+    let heavy = scenes.into_iter().find(|s| s.name == "heavy");
+    let mut heavy = heavy.expect("the scene");
+    let rig = CameraRig {
+        cameras: 2,
+        shift: 0.010,
+        turn: 1.1 * 0.010,
+        exposure: 0.1,
+        cell: 0.005,
+        ..CameraRig::default()
+    };
+    (heavy.scene.scans, heavy.scene.seed) = (1, 900);
+    heavy.scene.scanner = ScannerSetting {
+        points: usize::MAX,
+        rig: Some(rig),
+        ..ScannerSetting::default()
+    };
+    let row = measure(&heavy, 1).expect("measured");
     println!("{row:?}");
     let error = |name| row.get(name).unwrap_or(f64::NAN);
     assert!(error("F1") > 0.98);
@@ -471,17 +479,15 @@ fn a_dress_is_one_garment_around_both_legs() {
     .expect("a scan");
     let TrueScan {
         points,
-        faces,
         normals,
         colors,
         ..
     } = scans.into_iter().next().expect("one");
     let file = ScanMesh {
         points,
-        faces,
         normals,
         colors,
-        texture: Vec::new(),
+        ..ScanMesh::default()
     };
     let template = embedded::template();
     let (frame, start) = find_frame(&template, &file).expect("a person");

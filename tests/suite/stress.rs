@@ -123,7 +123,7 @@ fn a_torso_turns_seen_from_the_waist_up() {
     let (Some(data), Some(template)) = (data(), template()) else {
         return;
     };
-    let scene = scenes::hard(&data).expect("scenes").swap_remove(0);
+    let scene = scenes::scene(&data, "turn_upper").expect("a scene");
     let at = |name: &str| {
         scene
             .joint_names
@@ -188,7 +188,8 @@ fn an_arm_without_return_follows_its_hand() {
     let (Some(template), Some(data)) = (template(), data()) else {
         return;
     };
-    for mut scene in scenes::hard(&data).expect("scenes").split_off(1) {
+    for name in ["arm_without_return", "arm_without_return_room"] {
+        let mut scene = scenes::scene(&data, name).expect("a scene");
         scene.frames.truncate(100);
         let out = quiet(&template, &scene);
         let of = |joint: &str| {

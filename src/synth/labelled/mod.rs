@@ -3,17 +3,17 @@
 //! A person is a function of seed and number. Each person is seen in several poses.
 
 mod people;
+mod settings;
 mod stances;
 mod training;
 mod viewpoint;
 
-use super::clip::{ClipError, Performance};
+use super::furniture::NEAR;
 use super::stance::Rig;
 use rand::{Rng, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 use std::sync::Arc;
 use tryon_body::{BoneTransforms, RestBody, Template, skin};
-use tryon_formats::MotionClip;
 use tryon_geometry::camera::DepthImage;
 use tryon_geometry::math::{P3, P3d, V3, V3d};
 use tryon_geometry::par::Par;
@@ -23,36 +23,14 @@ use tryon_tracking::segment::part_forest::PersonCells;
 use tryon_tracking::{PartClasses, yaw_of_joints};
 use viewpoint::Viewpoint;
 
+pub use settings::LabelledSettings;
+
 pub use training::{TrainingPlan, train_parts};
 
 /// Label of a cell whose class the render does not give.
 pub const NO_CLASS: u8 = u8::MAX;
 /// Frames of one person: a shape costs as much as a frame.
 pub const FRAMES_PER_PERSON: usize = 4;
-/// Farthest reading, metres.
-const FARTHEST: f32 = 8.0;
-/// Surfaces nearer than this are clipped, metres.
-const NEAR: f32 = 0.2;
-/// Fewest cells of a frame.
-const LEAST_CELLS: usize = 150;
-/// Largest difference between a cell's depth and the surface that labels it, metres.
-const SAME_SURFACE: f32 = 0.06;
-/// Share of frames whose lowest cells are lost to the floor, and up to which height, metres.
-const FLOOR_LOSS: f64 = 0.5;
-/// See [`FLOOR_LOSS`].
-const FLOOR_HEIGHT: [f64; 2] = [0.02, 0.06];
-/// Share of frames that lose cells at the outline, and of those cells.
-const OUTLINE_LOSS: [f64; 2] = [0.3, 0.5];
-/// Share of frames in which furniture hides everything on one side of a border.
-const HIDDEN: f64 = 0.15;
-/// Heights of a horizontal border, share of the way from pelvis to head (a table, a counter); and distances of a vertical
-/// one from the pelvis, metres.
-const BORDERS: [[f64; 2]; 2] = [[-0.3, 0.4], [0.02, 0.3]];
-/// Share of horizontal borders.
-const TABLES: f64 = 0.6;
-/// Tries for a frame that shows enough of the person.
-const TRIES: usize = 8;
-
 /// A frame with its truth.
 #[derive(Clone, Debug)]
 pub struct LabelledFrame {
@@ -86,29 +64,19 @@ impl LabelledFrame {
 pub struct LabelledFrames {
     template: Arc<Template>,
     classes: PartClasses,
-    clips: Vec<Performance>,
     seed: u64,
+    settings: LabelledSettings,
 }
 
 impl LabelledFrames {
-    /// Frames of a template; poses come from the clips, from the try-on routine and from random key poses.
-    ///
-    /// # Errors
-    /// Names the joint that a clip lacks.
-    pub fn new(
-        template: Arc<Template>,
-        clips: Vec<MotionClip>,
-        seed: u64,
-    ) -> Result<Self, ClipError> {
-        Ok(Self {
+    /// Frames of a template; poses come from the try-on routine and from random key poses.
+    pub fn new(template: Arc<Template>, seed: u64) -> Self {
+        Self {
             classes: PartClasses::new(&template),
             template,
-            clips: clips
-                .into_iter()
-                .map(Performance::new)
-                .collect::<Result<_, _>>()?,
             seed,
-        })
+            settings: LabelledSettings::default(),
+        }
     }
     /// Classes of the template.
     pub fn classes(&self) -> &PartClasses {
@@ -119,11 +87,11 @@ impl LabelledFrames {
     pub fn person(&self, number: u64) -> Vec<LabelledFrame> {
         let mut rng = Pcg64Mcg::new(u128::from(self.seed) << 64 | u128::from(number) << 1 | 1);
         let mut rng = Pcg64Mcg::seed_from_u64(rng.random());
-        let rest = people::draw(&self.template, &self.classes, &mut rng);
+        let rest = people::draw(&self.settings, &self.template, &self.classes, &mut rng);
         let rig = Rig::new(self.template.skeleton(), &rest);
         let mut out = Vec::with_capacity(FRAMES_PER_PERSON);
         for _ in 0..FRAMES_PER_PERSON {
-            out.extend((0..TRIES).find_map(|_| self.frame(&rest, &rig, &mut rng)));
+            out.extend((0..self.settings.tries).find_map(|_| self.frame(&rest, &rig, &mut rng)));
         }
         out
     }
@@ -135,7 +103,11 @@ impl LabelledFrames {
         let drop = V3::new(0.0, -lowest, 0.0);
         let height = |p: &P3d| p.y - f64::from(lowest);
         let (head, pelvis) = (self.template.skeleton().index("head")?, 0);
-        let view = Viewpoint::draw([height(&joints[pelvis]), height(&joints[head])], rng);
+        let view = Viewpoint::draw(
+            &self.settings,
+            [height(&joints[pelvis]), height(&joints[head])],
+            rng,
+        );
         let to_camera = view.world_from_camera.inverse();
         let place = V3d::new(view.place[0], 0.0, view.place[1]);
         for j in &mut joints {
@@ -162,10 +134,12 @@ impl LabelledFrames {
     fn pose(&self, rest: &RestBody, rig: &Rig, rng: &mut Pcg64Mcg) -> (Vec<P3>, Vec<P3d>) {
         let skeleton = self.template.skeleton();
         let mut bones = BoneTransforms::default();
-        for _ in 0..TRIES {
-            let stance = stances::draw(rig, &self.clips, rng);
+        for _ in 0..self.settings.tries {
+            let stance = stances::draw(&self.settings, rig, rng);
             rig.pose(&stance).bones(skeleton, rest, &mut bones);
-            if !stances::penetrates(skeleton, &bones.joints) || rng.random_bool(0.1) {
+            if !stances::penetrates(skeleton, &bones.joints, self.settings.inside)
+                || rng.random_bool(0.1)
+            {
                 break;
             }
         }
@@ -197,10 +171,10 @@ impl LabelledFrames {
             image = quantised(&image, step);
         }
         let mut cloud = OrganisedCloud::new(&camera, None);
-        cloud.sample(&image, FARTHEST);
+        cloud.sample(&image, self.settings.farthest);
         let mut cells = self.cells(view, &cloud, rng);
         refine(&mut cloud, &image, &mut cells);
-        if cells.len() < LEAST_CELLS {
+        if cells.len() < self.settings.least_cells {
             return None;
         }
         let of = |c: &u32| self.label(&buffer, &cloud, *c as usize);
@@ -210,14 +184,15 @@ impl LabelledFrames {
 
     /// Cells with a reading, without those lost to the floor and at the outline.
     fn cells(&self, view: &Viewpoint, cloud: &OrganisedCloud, rng: &mut Pcg64Mcg) -> Vec<u32> {
-        let floor = if rng.random_bool(FLOOR_LOSS) {
-            rng.random_range(FLOOR_HEIGHT[0]..FLOOR_HEIGHT[1])
+        let settings = &self.settings;
+        let floor = if rng.random_bool(settings.floor_loss) {
+            rng.random_range(settings.floor_height[0]..settings.floor_height[1])
         } else {
             0.0
         };
-        let loss = rng.random_bool(OUTLINE_LOSS[0]);
+        let loss = rng.random_bool(settings.outline_loss[0]);
         let columns = cloud.size().0 as i32;
-        let border = HiddenSide::draw(view, rng);
+        let border = HiddenSide::draw(settings, view, rng);
         let mut keep = |c: &u32| {
             let cell = *c as usize;
             if cloud.depth[cell] <= 0.0 {
@@ -235,7 +210,7 @@ impl LabelledFrames {
                 k.is_some_and(|k| cloud.depth[k] <= 0.0)
             };
             let outline = empty(-1, 0) || empty(1, 0) || empty(0, -1) || empty(0, 1);
-            !(loss && outline && rng.random_bool(OUTLINE_LOSS[1]))
+            !(loss && outline && rng.random_bool(settings.outline_loss[1]))
         };
         let mut cells: Vec<u32> = (0..cloud.depth.len() as u32).collect();
         cells.retain(|c| keep(c));
@@ -247,7 +222,7 @@ impl LabelledFrames {
         let (columns, s) = (cloud.size().0, cloud.stride() as usize);
         let (u, v) = (cell % columns * s, cell / columns * s);
         let z = cloud.depth[cell];
-        let (mut best, mut least) = (NO_CLASS, SAME_SURFACE);
+        let (mut best, mut least) = (NO_CLASS, self.settings.same_surface);
         for (du, dv) in [(1, 1), (1, 3), (3, 1), (3, 3), (2, 2)] {
             let (du, dv) = (du * s / 4, dv * s / 4);
             let k = (v + dv) * buffer.width as usize + u + du;
@@ -271,20 +246,22 @@ struct HiddenSide {
 
 impl HiddenSide {
     /// A random border, in some frames.
-    fn draw(view: &Viewpoint, rng: &mut Pcg64Mcg) -> Option<Self> {
-        if !rng.random_bool(HIDDEN) {
+    fn draw(settings: &LabelledSettings, view: &Viewpoint, rng: &mut Pcg64Mcg) -> Option<Self> {
+        if !rng.random_bool(settings.hidden) {
             return None;
         }
-        if rng.random_bool(TABLES) {
+        if rng.random_bool(settings.tables) {
             let [pelvis, head] = view.heights;
-            let share = rng.random_range(BORDERS[0][0]..BORDERS[0][1]);
+            let [low, high] = settings.table_heights;
+            let share = rng.random_range(low..high);
             return Some(Self {
                 normal: V3d::y(),
                 offset: pelvis + share * (head - pelvis),
             });
         }
         let side = if rng.random_bool(0.5) { 1.0 } else { -1.0 };
-        let away = rng.random_range(BORDERS[1][0]..BORDERS[1][1]);
+        let [near, far] = settings.border_distances;
+        let away = rng.random_range(near..far);
         let normal = V3d::x() * side;
         Some(Self {
             normal,
@@ -323,7 +300,7 @@ mod tests {
     const PART_REACH: f64 = 0.45;
 
     fn frames(seed: u64) -> LabelledFrames {
-        LabelledFrames::new(embedded::template(), vec![], seed).expect("no clips")
+        LabelledFrames::new(embedded::template(), seed)
     }
 
     #[test]
@@ -333,7 +310,7 @@ mod tests {
         let mut seen = [0usize; PART_CLASSES];
         for frame in (0..12).flat_map(|i| frames.person(i)) {
             assert_eq!(frame.cells.len(), frame.labels.len());
-            assert!(frame.cells.is_sorted() && frame.cells.len() >= LEAST_CELLS);
+            assert!(frame.cells.is_sorted() && frame.cells.len() >= frames.settings.least_cells);
             for (&cell, &label) in frame.cells.iter().zip(&frame.labels) {
                 cells += 1;
                 if label == NO_CLASS {

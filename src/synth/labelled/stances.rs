@@ -1,8 +1,8 @@
-//! Random stances: key poses of arms, legs and torso, the try-on routine, and motion clips; mixed, with noise.
+//! Random stances: key poses of arms, legs and torso, and the try-on routine; mixed, with noise.
 
-use crate::clip::Performance;
+use super::settings::LabelledSettings;
 use crate::routine::Routine;
-use crate::stance::{Limb, Rig, Stance};
+use crate::stance::{Limb, Rig, Stance, limb};
 use nalgebra::UnitQuaternion;
 use rand::Rng;
 use rand_distr::{Distribution, StandardNormal};
@@ -17,82 +17,46 @@ const fn v(x: f64, y: f64, z: f64) -> V3d {
 /// Upper arm, forearm and hand as if left: x outward, y up, z forward, chest axes.
 const ARMS: [Limb; 24] = [
     // Hanging, a little out, calibration pose, to the side, up and out.
-    [
-        v(0.15, -0.98, 0.02),
-        v(0.1, -0.97, 0.2),
-        v(0.05, -0.98, 0.2),
-    ],
-    [
-        v(0.34, -0.93, -0.06),
-        v(0.24, -0.93, 0.24),
-        v(0.12, -0.95, 0.26),
-    ],
-    [
-        v(0.72, -0.69, 0.0),
-        v(0.68, -0.7, 0.18),
-        v(0.66, -0.7, 0.18),
-    ],
-    [
-        v(0.99, -0.02, 0.04),
-        v(0.97, 0.02, 0.22),
-        v(0.98, 0.0, 0.18),
-    ],
-    [v(0.62, 0.76, 0.12), v(0.4, 0.88, 0.22), v(0.36, 0.92, 0.14)],
+    limb([0.15, -0.98, 0.02], [0.1, -0.97, 0.2], [0.05, -0.98, 0.2]),
+    limb(
+        [0.34, -0.93, -0.06],
+        [0.24, -0.93, 0.24],
+        [0.12, -0.95, 0.26],
+    ),
+    limb([0.72, -0.69, 0.0], [0.68, -0.7, 0.18], [0.66, -0.7, 0.18]),
+    limb([0.99, -0.02, 0.04], [0.97, 0.02, 0.22], [0.98, 0.0, 0.18]),
+    limb([0.62, 0.76, 0.12], [0.4, 0.88, 0.22], [0.36, 0.92, 0.14]),
     // Hands joined over the head, and before the chest; arms crossed; hand on the hip; in the pocket.
-    [v(0.35, 0.9, 0.2), v(-0.45, 0.88, 0.1), v(-0.4, 0.9, 0.1)],
-    [v(0.35, -0.8, 0.35), v(-0.75, 0.3, 0.6), v(-0.75, 0.5, 0.4)],
-    [
-        v(0.25, -0.85, 0.45),
-        v(-0.93, 0.12, 0.33),
-        v(-0.95, 0.2, 0.05),
-    ],
-    [
-        v(0.66, -0.72, -0.22),
-        v(-0.52, -0.64, 0.56),
-        v(-0.25, -0.55, 0.79),
-    ],
-    [
-        v(0.32, -0.93, -0.12),
-        v(0.0, -0.92, 0.38),
-        v(-0.1, -0.95, 0.3),
-    ],
+    limb([0.35, 0.9, 0.2], [-0.45, 0.88, 0.1], [-0.4, 0.9, 0.1]),
+    limb([0.35, -0.8, 0.35], [-0.75, 0.3, 0.6], [-0.75, 0.5, 0.4]),
+    limb([0.25, -0.85, 0.45], [-0.93, 0.12, 0.33], [-0.95, 0.2, 0.05]),
+    limb(
+        [0.66, -0.72, -0.22],
+        [-0.52, -0.64, 0.56],
+        [-0.25, -0.55, 0.79],
+    ),
+    limb([0.32, -0.93, -0.12], [0.0, -0.92, 0.38], [-0.1, -0.95, 0.3]),
     // Forward, forward and down, forearm forward, guard of a boxer, punch.
-    [v(0.1, -0.08, 1.0), v(0.0, 0.0, 1.0), v(0.0, 0.0, 1.0)],
-    [v(0.2, -0.65, 0.72), v(0.0, -0.35, 0.93), v(0.0, -0.4, 0.9)],
-    [v(0.2, -0.95, 0.15), v(0.0, -0.1, 1.0), v(0.0, 0.0, 1.0)],
-    [
-        v(0.25, -0.85, 0.45),
-        v(-0.25, 0.75, 0.6),
-        v(-0.25, 0.75, 0.6),
-    ],
-    [v(-0.05, -0.1, 1.0), v(-0.15, 0.02, 1.0), v(-0.15, 0.0, 1.0)],
+    limb([0.1, -0.08, 1.0], [0.0, 0.0, 1.0], [0.0, 0.0, 1.0]),
+    limb([0.2, -0.65, 0.72], [0.0, -0.35, 0.93], [0.0, -0.4, 0.9]),
+    limb([0.2, -0.95, 0.15], [0.0, -0.1, 1.0], [0.0, 0.0, 1.0]),
+    limb([0.25, -0.85, 0.45], [-0.25, 0.75, 0.6], [-0.25, 0.75, 0.6]),
+    limb([-0.05, -0.1, 1.0], [-0.15, 0.02, 1.0], [-0.15, 0.0, 1.0]),
     // Waving, hand to the head, to the mouth, behind the back, backward.
-    [v(0.85, -0.3, 0.2), v(0.3, 0.92, 0.2), v(0.2, 0.96, 0.1)],
-    [v(0.75, 0.4, 0.3), v(-0.75, 0.62, 0.1), v(-0.9, 0.2, 0.0)],
-    [v(0.3, -0.7, 0.6), v(-0.4, 0.88, 0.15), v(-0.4, 0.9, 0.0)],
-    [
-        v(0.35, -0.88, -0.35),
-        v(-0.7, -0.5, -0.5),
-        v(-0.9, -0.2, -0.3),
-    ],
-    [
-        v(0.25, -0.8, -0.55),
-        v(0.2, -0.85, -0.4),
-        v(0.2, -0.85, -0.4),
-    ],
+    limb([0.85, -0.3, 0.2], [0.3, 0.92, 0.2], [0.2, 0.96, 0.1]),
+    limb([0.75, 0.4, 0.3], [-0.75, 0.62, 0.1], [-0.9, 0.2, 0.0]),
+    limb([0.3, -0.7, 0.6], [-0.4, 0.88, 0.15], [-0.4, 0.9, 0.0]),
+    limb([0.35, -0.88, -0.35], [-0.7, -0.5, -0.5], [-0.9, -0.2, -0.3]),
+    limb([0.25, -0.8, -0.55], [0.2, -0.85, -0.4], [0.2, -0.85, -0.4]),
     // Down to a club, swing of a club, hand on the other shoulder; elbows at shoulder height, forearms up, down.
-    [
-        v(0.05, -0.82, 0.57),
-        v(-0.35, -0.75, 0.55),
-        v(-0.35, -0.75, 0.55),
-    ],
-    [v(-0.5, 0.1, 0.86), v(-0.7, 0.5, 0.5), v(-0.6, 0.7, 0.3)],
-    [v(0.98, 0.0, 0.15), v(0.05, 0.98, 0.15), v(0.0, 0.98, 0.1)],
-    [
-        v(0.95, -0.05, 0.25),
-        v(0.05, -0.95, 0.3),
-        v(0.0, -0.95, 0.3),
-    ],
+    limb(
+        [0.05, -0.82, 0.57],
+        [-0.35, -0.75, 0.55],
+        [-0.35, -0.75, 0.55],
+    ),
+    limb([-0.5, 0.1, 0.86], [-0.7, 0.5, 0.5], [-0.6, 0.7, 0.3]),
+    limb([0.98, 0.0, 0.15], [0.05, 0.98, 0.15], [0.0, 0.98, 0.1]),
+    limb([0.95, -0.05, 0.25], [0.05, -0.95, 0.3], [0.0, -0.95, 0.3]),
 ];
 
 /// Thigh and shank of one leg as if left.
@@ -139,19 +103,6 @@ const TORSOS: [([f64; 4], f64); 8] = [
     ([0.0, 0.0, 0.0, 22.0], 0.06),
 ];
 
-/// Spread of the directions of arms, legs, and of the angles of chest and head, degrees.
-const NOISE: [f64; 4] = [14.0, 8.0, 6.0, 12.0];
-/// Shares of poses from clips (where there are any) and from the routine.
-const SOURCES: [f64; 2] = [0.35, 0.1];
-/// Share of key poses with both arms alike.
-const ALIKE: f64 = 0.45;
-/// Share of key poses with both arms to one side: a club, a bat, a bag that both hands hold.
-const PARALLEL: f64 = 0.08;
-/// Share of key poses part of the way to another.
-const BETWEEN: f64 = 0.4;
-/// Distance of elbows and wrists from the axis of the trunk below which an arm is inside it, metres.
-const INSIDE: f64 = 0.12;
-
 fn normal(rng: &mut Pcg64Mcg) -> f64 {
     StandardNormal.sample(rng)
 }
@@ -181,15 +132,16 @@ fn outward(side: usize, d: &V3d) -> V3d {
 }
 
 /// A key pose with noise, facing +z.
-fn key_pose(rng: &mut Pcg64Mcg) -> Stance {
+fn key_pose(settings: &LabelledSettings, rng: &mut Pcg64Mcg) -> Stance {
+    let noise = settings.noise;
     let first = rng.random_range(0..ARMS.len());
-    let second = if rng.random_bool(ALIKE) {
+    let second = if rng.random_bool(settings.alike) {
         first
     } else {
         rng.random_range(0..ARMS.len())
     };
     let arms = [first, second];
-    let parallel = rng.random_bool(PARALLEL);
+    let parallel = rng.random_bool(settings.parallel);
     let lead = usize::from(rng.random_bool(0.5));
     let arms = [0, 1].map(|s| {
         let (key, side) = if parallel {
@@ -197,7 +149,7 @@ fn key_pose(rng: &mut Pcg64Mcg) -> Stance {
         } else {
             (arms[s], s)
         };
-        ARMS[key].map(|d| shaken(&outward(side, &d), NOISE[0], rng))
+        ARMS[key].map(|d| shaken(&outward(side, &d), noise[0], rng))
     });
     let (left, right, _) = LEGS[pick(&LEGS, |l| l.2, rng)];
     let legs = if rng.random_bool(0.5) {
@@ -210,20 +162,20 @@ fn key_pose(rng: &mut Pcg64Mcg) -> Stance {
     let heading = exp_so3(&v((pelvis + 3.0 * normal(rng)).to_radians(), 0.0, 0.0));
     let level = heading.inverse();
     let legs = [0, 1].map(|s| {
-        let [thigh, shank] = legs[s].map(|d| level * shaken(&outward(s, &d), NOISE[1], rng));
+        let [thigh, shank] = legs[s].map(|d| level * shaken(&outward(s, &d), noise[1], rng));
         [thigh, shank, level * V3d::z()]
     });
     let yaw = |rng: &mut Pcg64Mcg| exp_so3(&v(0.0, 0.2 * normal(rng), 0.0));
     let mut angle = |mean: f64, spread: f64| (mean + spread * normal(rng)).to_radians();
     let chest = v(
-        angle(chest, NOISE[2]),
-        angle(mirror * twist, NOISE[2]),
-        angle(-mirror * lean, NOISE[2]),
+        angle(chest, noise[2]),
+        angle(mirror * twist, noise[2]),
+        angle(-mirror * lean, noise[2]),
     );
     let head = v(
-        angle(5.0, NOISE[3]),
-        angle(0.0, 1.5 * NOISE[3]),
-        angle(0.0, 0.5 * NOISE[3]),
+        angle(5.0, noise[3]),
+        angle(0.0, 1.5 * noise[3]),
+        angle(0.0, 0.5 * noise[3]),
     );
     Stance {
         pelvis: P3d::origin(),
@@ -237,18 +189,14 @@ fn key_pose(rng: &mut Pcg64Mcg) -> Stance {
 }
 
 /// A random stance over the origin, turned anywhere.
-pub(super) fn draw(rig: &Rig, clips: &[Performance], rng: &mut Pcg64Mcg) -> Stance {
-    let source: f64 = rng.random();
-    let mut stance = if !clips.is_empty() && source < SOURCES[0] {
-        let clip = &clips[rng.random_range(0..clips.len())];
-        clip.moment(rig, rng.random())
-    } else if source < SOURCES[0] + SOURCES[1] {
+pub(super) fn draw(settings: &LabelledSettings, rig: &Rig, rng: &mut Pcg64Mcg) -> Stance {
+    let mut stance = if rng.random::<f64>() < settings.routine {
         let t = rng.random::<f64>() * Routine::TryOn.period();
         Routine::TryOn.stance(rig, P3d::origin(), t)
     } else {
-        let key = key_pose(rng);
-        if rng.random_bool(BETWEEN) {
-            key.blend(&key_pose(rng), rng.random())
+        let key = key_pose(settings, rng);
+        if rng.random_bool(settings.between) {
+            key.blend(&key_pose(settings, rng), rng.random())
         } else {
             key
         }
@@ -261,8 +209,8 @@ pub(super) fn draw(rig: &Rig, clips: &[Performance], rng: &mut Pcg64Mcg) -> Stan
     stance
 }
 
-/// True if an elbow or a wrist is inside the trunk.
-pub(super) fn penetrates(skeleton: &Skeleton, joints: &[P3d]) -> bool {
+/// True if an elbow or a wrist is within `radius` (m) of the axis of the trunk.
+pub(super) fn penetrates(skeleton: &Skeleton, joints: &[P3d], radius: f64) -> bool {
     let at = |name: &str| skeleton.index(name).map(|j| joints[j]);
     let (Some(pelvis), Some(neck)) = (at("pelvis"), at("neck")) else {
         return false;
@@ -270,7 +218,7 @@ pub(super) fn penetrates(skeleton: &Skeleton, joints: &[P3d]) -> bool {
     let axis = neck - pelvis;
     let inside = |p: P3d| {
         let t = (p - pelvis).dot(&axis) / axis.norm_squared().max(f64::MIN_POSITIVE);
-        (-0.1..1.0).contains(&t) && (p - (pelvis + axis * t)).norm() < INSIDE
+        (-0.1..1.0).contains(&t) && (p - (pelvis + axis * t)).norm() < radius
     };
     [
         "left_elbow",

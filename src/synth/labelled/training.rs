@@ -28,8 +28,6 @@ impl Default for TrainingPlan {
     }
 }
 
-/// Share of the work that rendering is, for the progress.
-const RENDERING: f64 = 0.3;
 /// People rendered at a time; their frames are in memory together.
 const BATCH: usize = 32;
 
@@ -39,6 +37,7 @@ pub fn train_parts(
     plan: &TrainingPlan,
     progress: &mut dyn FnMut(f64),
 ) -> PartForest {
+    let rendering = frames.settings.rendering;
     let people = plan.images.div_ceil(FRAMES_PER_PERSON);
     let mut set = TrainingSet::default();
     let mut batch: Vec<Vec<LabelledFrame>> = Vec::new();
@@ -54,10 +53,10 @@ pub fn train_parts(
                 set.add(&frame.person(), &chosen, frame.yaw);
             }
         }
-        progress(RENDERING * (start + count) as f64 / people as f64);
+        progress(rendering * (start + count) as f64 / people as f64);
     }
     train(&set, PART_CLASSES, &plan.forest, Par::Rayon, &mut |share| {
-        progress(RENDERING + (1.0 - RENDERING) * share);
+        progress(rendering + (1.0 - rendering) * share);
     })
 }
 

@@ -1,29 +1,11 @@
 //! Random cameras: distance, height, tilt, roll, framing, resolution and noise.
 
+use super::settings::LabelledSettings;
 use crate::Setting;
 use rand::Rng;
 use rand_pcg::Pcg64Mcg;
 use tryon_geometry::camera::{Intrinsics, NoiseModel};
 use tryon_geometry::math::{Camera, Rigid, World};
-
-/// Distances of whole bodies and of busts, metres.
-const DISTANCES: [[f64; 2]; 2] = [[1.5, 4.0], [0.8, 2.0]];
-/// Share of frames from the waist up.
-const BUSTS: f64 = 0.25;
-/// Heights of the camera, metres.
-const HEIGHTS: [f64; 2] = [0.6, 2.2];
-/// Share of images of coarse depth, and their steps, millimetres.
-const QUANTISED: f64 = 0.3;
-/// See [`QUANTISED`].
-const QUANTA: [u16; 2] = [10, 20];
-/// Largest tilt, degrees.
-const TILT: f64 = 25.0;
-/// Share of upright mounted cameras, and the largest roll of any, degrees.
-const PORTRAIT: f64 = 0.2;
-/// See [`PORTRAIT`].
-const ROLL: f64 = 5.0;
-/// Largest part of the half width of the image by which a person stands beside its middle.
-const ASIDE: f64 = 0.5;
 
 /// Depth cameras: width, height, focal length, time of flight.
 const CAMERAS: [(u32, u32, f64, bool); 6] = [
@@ -51,14 +33,18 @@ pub(super) struct Viewpoint {
 
 impl Viewpoint {
     /// A random viewpoint of a person whose pelvis and head are at these heights, metres.
-    pub(super) fn draw([pelvis, head]: [f64; 2], rng: &mut Pcg64Mcg) -> Self {
+    pub(super) fn draw(
+        settings: &LabelledSettings,
+        [pelvis, head]: [f64; 2],
+        rng: &mut Pcg64Mcg,
+    ) -> Self {
         let (width, height, f, time_of_flight) = CAMERAS[rng.random_range(0..CAMERAS.len())];
         let noise = if time_of_flight {
             NoiseModel::TimeOfFlight
         } else {
             NoiseModel::KinectV1
         };
-        let portrait = rng.random_bool(PORTRAIT);
+        let portrait = rng.random_bool(settings.portrait);
         let quarter = if !portrait {
             0.0
         } else if rng.random_bool(0.5) {
@@ -66,10 +52,11 @@ impl Viewpoint {
         } else {
             -90.0
         };
-        let bust = rng.random_bool(BUSTS);
-        let range = DISTANCES[usize::from(bust)];
-        let distance: f64 = rng.random_range(range[0]..range[1]);
-        let camera_height = rng.random_range(HEIGHTS[0]..HEIGHTS[1]);
+        let bust = rng.random_bool(settings.busts);
+        let [near, far] = settings.distances[usize::from(bust)];
+        let distance: f64 = rng.random_range(near..far);
+        let [low, high] = settings.heights;
+        let camera_height = rng.random_range(low..high);
         let aim = if bust {
             // The head hangs below the pelvis of a person who bends down.
             let share: f64 = rng.random_range(0.6..1.0);
@@ -78,14 +65,16 @@ impl Viewpoint {
             pelvis * rng.random_range(0.8..1.2)
         };
         let down: f64 = (camera_height - aim).atan2(distance).to_degrees();
-        let down = (down + rng.random_range(-3.0..3.0)).clamp(-TILT, TILT);
-        let roll = quarter + rng.random_range(-ROLL..ROLL);
+        let down = (down + rng.random_range(-3.0..3.0)).clamp(-settings.tilt, settings.tilt);
+        let roll = quarter + rng.random_range(-settings.roll..settings.roll);
         let across = if portrait { height } else { width };
-        let aside = rng.random_range(-ASIDE..ASIDE) * distance * f64::from(across) / (2.0 * f);
-        let coarse = rng.random_bool(QUANTISED);
+        let aside =
+            rng.random_range(-settings.aside..settings.aside) * distance * f64::from(across)
+                / (2.0 * f);
+        let coarse = rng.random_bool(settings.quantised);
         Self {
             heights: [pelvis, head],
-            quantum: coarse.then(|| rng.random_range(QUANTA[0]..=QUANTA[1])),
+            quantum: coarse.then(|| rng.random_range(settings.quanta[0]..=settings.quanta[1])),
             camera: Intrinsics {
                 width,
                 height,

@@ -1,9 +1,12 @@
 //! Commands and flags of `tryon-bench`.
 
-use clap::{Args, Parser, Subcommand};
+use clap::{Args, Parser, Subcommand, ValueEnum};
 use std::path::PathBuf;
+use tryon_bench::OutfitSpec;
+use tryon_bench::people::PeoplePlan;
+use tryon_bench::tracking_plan::TrackingPlan;
 
-/// Run time against error, methods side by side: tables as CSV and JSON, plots as SVG.
+/// Run time against error, methods side by side: tables as Markdown and JSON.
 #[derive(Debug, Parser)]
 #[command(
     name = "tryon-bench",
@@ -19,10 +22,16 @@ pub(crate) struct Cli {
 
 #[derive(Debug, Subcommand)]
 pub(crate) enum Command {
-    /// Tracking over iterations, samples, correspondences and metric, on recorded and synthetic sequences.
+    /// Tracking of recorded and synthetic sequences under settings side by side.
     Tracking(TrackingArgs),
     /// Cloth on the standard scenes, by the live step or the offline solver.
     Cloth(ClothArgs),
+    /// An outfit on a dancing body without a template: time, stretch, penetration.
+    Dance(DanceArgs),
+    /// Sleeping cloth on a body that stands, waves, lifts an arm or walks off.
+    Standing(StandingArgs),
+    /// Dress bodies and draw each outfit from several sides.
+    Turntable(TurntableArgs),
     /// Tracking of everyone who walks in: people, postures and sides from nothing, stills and recordings.
     People(PeopleArgs),
     /// Garment capture on dressed scans with truth: labels, boundaries, surfaces, the body below, other bodies.
@@ -37,7 +46,7 @@ pub(crate) enum Command {
 
 #[derive(Debug, Args)]
 pub(crate) struct ClothcapArgs {
-    /// Folder for clothcap.csv, .json and one clothcap-*.svg per measure of error.
+    /// Folder for clothcap.md and clothcap.json.
     #[arg(long, value_name = "DIR")]
     pub(crate) out: PathBuf,
     /// Folder with clothes, bodies and motions made by others; without it their scenes are skipped.
@@ -49,13 +58,6 @@ pub(crate) struct ClothcapArgs {
     /// The third of the scenes that is kept apart, instead of the other two thirds.
     #[arg(long)]
     pub(crate) unseen: bool,
-    /// Also without prior, without smoothness, and with the number of garments given; turns are left out.
-    #[arg(long)]
-    pub(crate) ablation: bool,
-    /// Run time against error instead: points of the scans, lengths and iterations of the part fit; turns are left out.
-    /// Minutes a scene.
-    #[arg(long, conflicts_with = "ablation")]
-    pub(crate) sweep: bool,
     /// Bodies that each outfit is retargeted to.
     #[arg(long, value_name = "N", default_value_t = 10)]
     pub(crate) bodies: usize,
@@ -69,26 +71,13 @@ pub(crate) struct PeopleArgs {
     /// Folder for people.md and people.json.
     #[arg(long, value_name = "DIR")]
     pub(crate) out: PathBuf,
-    /// Folder with bodies, motions and recordings; without it their rows are skipped.
-    #[arg(long, value_name = "DIR")]
-    pub(crate) data: Option<PathBuf>,
-    /// Only these rows: unlike, shops, poses, sides, limb, stills, shared, uva.
-    #[arg(long, value_name = "NAME", value_delimiter = ',')]
-    pub(crate) only: Vec<String>,
-    /// A fraction of the cases of each row: two minutes instead of many.
-    #[arg(long)]
-    pub(crate) quick: bool,
-    /// The third of the cases that is kept apart, instead of the other two thirds.
-    #[arg(long)]
-    pub(crate) unseen: bool,
-    /// Folder for a contact sheet per row: depth with true (green) and tracked (red) joints.
-    #[arg(long, value_name = "DIR")]
-    pub(crate) pictures: Option<PathBuf>,
+    #[command(flatten)]
+    pub(crate) plan: PeoplePlan,
 }
 
 #[derive(Debug, Args)]
 pub(crate) struct ClothArgs {
-    /// Folder for cloth.csv, cloth.json and one cloth-*.svg per measure of error.
+    /// Folder for cloth.md and cloth.json.
     #[arg(long, value_name = "DIR")]
     pub(crate) out: PathBuf,
     /// Folder of the scenes and their reference positions.
@@ -100,34 +89,144 @@ pub(crate) struct ClothArgs {
     /// Slow variants on the large scenes too (many minutes, with --offline).
     #[arg(long, requires = "offline")]
     pub(crate) full: bool,
-    /// The offline solver instead: time schemes, linear solvers, steps, resolutions (cloth-offline.csv …).
+    /// The offline solver instead: time schemes, linear solvers, steps, resolutions (cloth-offline.md …).
     #[arg(long)]
     pub(crate) offline: bool,
     /// Most frames of a scene (with --offline).
     #[arg(long, value_name = "N", requires = "offline")]
     pub(crate) frames: Option<usize>,
-    /// The sewn dress on the dancing body of this folder instead of scenes (dress-offline.csv …, with --offline).
+    /// The sewn dress on the dancing body of this folder instead of scenes (dress-offline.md …, with --offline).
     #[arg(long, value_name = "DIR", requires = "offline", conflicts_with_all = ["scene", "full"])]
     pub(crate) dress: Option<PathBuf>,
-    /// Vertices of the dress: its longest edges are halved.
-    #[arg(long, value_name = "N", default_value_t = 30_000, requires = "dress")]
-    pub(crate) vertices: usize,
     /// Threads, 0 for all cores (with --offline).
     #[arg(long, value_name = "N", default_value_t = 0, requires = "offline")]
     pub(crate) threads: usize,
 }
 
 #[derive(Debug, Args)]
-pub(crate) struct TrackingArgs {
-    /// Folder for tracking.csv, tracking.json and one tracking-*.svg per measure of error.
+pub(crate) struct OutfitArgs {
+    /// Folder for the table as Markdown and JSON.
     #[arg(long, value_name = "DIR")]
     pub(crate) out: PathBuf,
-    /// Folder with bodies, motions and sequences that have truth; without it, synthetic scenes of the embedded body.
+    /// Garments of the library, innermost first.
+    #[arg(long, value_name = "A+B", default_value = "tshirt+skirt")]
+    garment: String,
+    /// Edge length of the triangles (m).
+    #[arg(long, value_name = "M", default_value_t = 0.0118)]
+    edge: f64,
+    /// Settings of the simulation as JSON, for example `{"most_steps":1000}`.
+    #[arg(long, value_name = "JSON", default_value = "{}")]
+    set: String,
+    /// Worker threads.
+    #[arg(long, value_name = "N", default_value_t = 2)]
+    pub(crate) threads: usize,
+}
+
+impl OutfitArgs {
+    /// Garments and the solver that simulates them.
+    pub(crate) fn outfit(&self) -> anyhow::Result<OutfitSpec> {
+        Ok(OutfitSpec {
+            garments: self.garment.split('+').map(str::to_owned).collect(),
+            edge: self.edge,
+            config: serde_json::from_str(&self.set)?,
+        })
+    }
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct DanceArgs {
+    #[command(flatten)]
+    pub(crate) worn: OutfitArgs,
+    /// Folder of the dance.
+    #[arg(
+        long,
+        value_name = "DIR",
+        default_value = "../shared/data/garments/cipc_apache2"
+    )]
+    pub(crate) data: PathBuf,
+    /// Length of the dance (s).
+    #[arg(long, value_name = "S", default_value_t = 4.8)]
+    pub(crate) seconds: f64,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct StandingArgs {
+    #[command(flatten)]
+    pub(crate) worn: OutfitArgs,
+    /// Steps of 1/30 s in each motion.
+    #[arg(long, value_name = "N", default_value_t = 60)]
+    pub(crate) steps: usize,
+    /// Angle of straight arms below the horizontal (degrees): 75 hang; without it they are off the trunk.
+    #[arg(long, value_name = "A")]
+    pub(crate) arms: Option<f64>,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct TurntableArgs {
+    /// Folder for one PNG an outfit.
     #[arg(long, value_name = "DIR")]
-    pub(crate) data: Option<PathBuf>,
-    /// One scene, a third of its frames, a few variants: a minute instead of many.
+    pub(crate) out: PathBuf,
+    /// Garments worn together: names of the library, patterns (.json) or meshes (.obj, .glb, .mhclo); without any, each of the
+    /// library.
+    #[arg(long, value_name = "A+B")]
+    pub(crate) garment: Vec<String>,
+    /// Body that the mesh garments were made on (.npz, .obj).
+    #[arg(long, value_name = "FILE")]
+    pub(crate) garment_body: Option<PathBuf>,
+    /// Bodies, a row each: named shapes, files (.npz), or recordings whose person is tracked.
+    #[arg(
+        long,
+        value_delimiter = ',',
+        default_value = "slim_woman,average,heavy_man"
+    )]
+    pub(crate) body: Vec<String>,
+    /// Sizes, a block of columns each; `auto` is the suggested one.
+    #[arg(long, value_delimiter = ',', default_value = "auto")]
+    pub(crate) size: Vec<String>,
+    /// Pose and motion of a body that is no recording.
+    #[arg(long, default_value = "down")]
+    pub(crate) pose: TurntablePose,
+    /// Length of the motion (s).
+    #[arg(long, value_name = "S", default_value_t = 1.0)]
+    pub(crate) seconds: f64,
+    /// Edge length of the triangles (m).
+    #[arg(long, value_name = "M")]
+    pub(crate) edge: Option<f64>,
+    /// Paint and print the fit.
     #[arg(long)]
-    pub(crate) quick: bool,
+    pub(crate) fit: bool,
+    /// Sizes that do not fit too.
+    #[arg(long)]
+    pub(crate) any_size: bool,
+    /// Paint edges through triangles of the same garment.
+    #[arg(long)]
+    pub(crate) crossings: bool,
+    /// Without contact of cloth with itself.
+    #[arg(long)]
+    pub(crate) no_folds: bool,
+    /// Without untangling.
+    #[arg(long)]
+    pub(crate) tangled: bool,
+}
+
+/// Pose of a body of the turntable.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum TurntablePose {
+    /// Arms hanging.
+    Down,
+    /// Arms as in the rest pose.
+    Rest,
+    /// Walking on the spot, arms hanging.
+    Walk,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct TrackingArgs {
+    /// Folder for tracking.md and tracking.json.
+    #[arg(long, value_name = "DIR")]
+    pub(crate) out: PathBuf,
+    #[command(flatten)]
+    pub(crate) plan: TrackingPlan,
 }
 
 #[derive(Debug, Args)]
@@ -138,30 +237,9 @@ pub(crate) struct TrainPartsArgs {
     /// Score the forest in FILE instead of training one.
     #[arg(long)]
     pub(crate) score: bool,
-    /// Folder with itop_stills and msr_action3d, for the score.
-    #[arg(long, value_name = "DIR", requires = "score")]
-    pub(crate) recordings: Option<PathBuf>,
     /// Training images.
     #[arg(long, default_value_t = 14_000, value_name = "N")]
     pub(crate) images: usize,
-    /// Labelled cells an image.
-    #[arg(long, default_value_t = 220, value_name = "N")]
-    pub(crate) cells: usize,
-    /// Trees.
-    #[arg(long, default_value_t = 3, value_name = "N")]
-    pub(crate) trees: usize,
-    /// Splits from the root to the deepest leaf.
-    #[arg(long, default_value_t = 18, value_name = "N")]
-    pub(crate) depth: usize,
-    /// Most splits of a tree.
-    #[arg(long, default_value_t = 27_000, value_name = "N")]
-    pub(crate) splits: usize,
-    /// Random features per node.
-    #[arg(long, default_value_t = 112, value_name = "N")]
-    pub(crate) features: usize,
-    /// Folder with motion clips (.bvh, .amc with .asf) for part of the poses.
-    #[arg(long, value_name = "DIR")]
-    pub(crate) motions: Option<PathBuf>,
     /// Synthetic images of the score.
     #[arg(long, default_value_t = 1200, value_name = "N")]
     pub(crate) test_images: usize,

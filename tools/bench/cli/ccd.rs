@@ -6,9 +6,6 @@ use std::process::ExitCode;
 use tryon_bench::ccd::{CcdScore, score_ccd};
 
 /// Runs the command. Exit code 1 when an impact was missed.
-///
-/// # Errors
-/// Query sets that cannot be read.
 pub(crate) fn run(args: &CcdArgs) -> Result<ExitCode> {
     let report = score_ccd(&args.queries)?;
     if args.json {

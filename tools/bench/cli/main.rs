@@ -10,6 +10,7 @@ mod make_body;
 mod measure;
 mod progress;
 mod train_parts;
+mod turntable;
 
 use args::{Cli, Command};
 use clap::Parser;
@@ -19,10 +20,13 @@ fn main() -> ExitCode {
     let outcome = match Cli::parse().command {
         Command::Tracking(a) => measure::tracking(&a),
         Command::Cloth(a) => measure::cloth(&a),
+        Command::Dance(a) => measure::dance(&a),
+        Command::Standing(a) => measure::standing(&a),
         Command::People(a) => measure::people(&a),
         Command::Clothcap(a) => measure::clothcap(&a),
         Command::Ccd(a) => ccd::run(&a),
         Command::MakeBody(a) => make_body::run(&a),
+        Command::Turntable(a) => turntable::run(&a),
         Command::TrainParts(a) => train_parts::run(&a),
     };
     outcome.unwrap_or_else(|e| {

@@ -6,9 +6,6 @@ use std::process::ExitCode;
 use tryon_bench::made_body::generate;
 
 /// Runs the command.
-///
-/// # Errors
-/// A file that cannot be written.
 pub(crate) fn run(args: &MakeBodyArgs) -> Result<ExitCode> {
     let body = generate()?;
     let bytes = body.to_bytes();

@@ -1,44 +1,32 @@
-//! Tables and plots of run time against error.
+//! Tables of run time against error.
 
-use crate::args::{ClothArgs, ClothcapArgs, PeopleArgs, TrackingArgs};
+use crate::args::{ClothArgs, ClothcapArgs, DanceArgs, PeopleArgs, StandingArgs, TrackingArgs};
 use crate::progress::progress;
 use anyhow::Result;
 use std::path::Path;
 use std::process::ExitCode;
-use tryon::cloth::fine::OfflineSettings;
 use tryon::geometry::par::with_threads;
-use tryon_bench::ablation::{self, Extent};
-use tryon_bench::cloth::ClothBench;
-use tryon_bench::cloth_offline::OfflineBench;
-use tryon_bench::dress_offline::DressBench;
+use tryon_bench::cloth_offline::{self, OfflineBench};
+use tryon_bench::dance::load;
 use tryon_bench::garment_capture::{
-    CaptureVariant, capture_scenes, made_scenes, measure_all, measure_turn_scene, turn_scenes,
+    capture_scenes, made_scenes, measure, measure_turn_scene, turn_scenes,
 };
-use tryon_bench::people::{self, CaseSet, PeoplePlan};
-use tryon_bench::{Row, Table};
+use tryon_bench::people;
+use tryon_bench::rest::measure_rest;
+use tryon_bench::{Table, cloth};
 
 /// Frames of the dress without --frames.
 const DRESS_FRAMES: usize = 4;
 
 /// Runs `tryon-bench tracking`.
-///
-/// # Errors
-/// Scenes that cannot be read, or results that cannot be written.
 pub(crate) fn tracking(args: &TrackingArgs) -> Result<ExitCode> {
-    let extent = if args.quick {
-        Extent::Quick
-    } else {
-        Extent::Full
-    };
-    let plan = ablation::plan(args.data.as_deref(), extent)?;
-    let bar = progress(Some(plan.runs() as u64), "measuring");
+    let bar = progress(None, "measuring");
     let mut table = Table::new(
         "tracking",
-        command(args),
         "one step on one thread, displacements amortised",
     );
     with_threads(1, || {
-        plan.run(|row: Row| {
+        args.plan.run(|row| {
             bar.inc(1);
             table.rows.push(row);
         })
@@ -48,84 +36,88 @@ pub(crate) fn tracking(args: &TrackingArgs) -> Result<ExitCode> {
 }
 
 /// Runs `tryon-bench cloth`.
-///
-/// # Errors
-/// Scenes that cannot be read, or results that cannot be written.
 pub(crate) fn cloth(args: &ClothArgs) -> Result<ExitCode> {
     if let Some(folder) = &args.dress {
         return with_threads(args.threads, || dress_offline(args, folder))?;
     }
     if args.offline {
-        return with_threads(args.threads, || cloth_offline(args))?;
+        return with_threads(args.threads, || offline_scenes(args))?;
     }
-    let mut bench = ClothBench::default();
-    if !args.scene.is_empty() {
-        bench.scenes.clone_from(&args.scene);
-    }
+    let scenes = wanted(&args.scene, &cloth::SCENES);
     let bar = progress(None, "measuring");
-    let table = tryon_bench::cloth::cloth(&args.scenes, &bench, |_| bar.inc(1))?;
+    let table = cloth::cloth(&args.scenes, &scenes, |_| bar.inc(1))?;
     bar.finish_and_clear();
     finish(&table, &args.out)
 }
 
-fn cloth_offline(args: &ClothArgs) -> Result<ExitCode> {
-    let mut bench = OfflineBench {
-        full: args.full,
-        ..OfflineBench::default()
-    };
-    bench.frames = args.frames.unwrap_or(bench.frames);
-    if !args.scene.is_empty() {
-        bench.scenes.clone_from(&args.scene);
+/// The scenes asked for, or all.
+fn wanted(asked: &[String], all: &[&str]) -> Vec<String> {
+    match asked {
+        [] => all.iter().map(|s| (*s).to_owned()).collect(),
+        some => some.to_vec(),
     }
+}
+
+fn offline_scenes(args: &ClothArgs) -> Result<ExitCode> {
+    let bench = OfflineBench {
+        scenes: wanted(&args.scene, &cloth_offline::SCENES),
+        full: args.full,
+        frames: args.frames.unwrap_or(usize::MAX),
+    };
     let bar = progress(None, "measuring");
-    let mut table = tryon_bench::cloth_offline::cloth_offline(&args.scenes, &bench, |row| {
+    let table = cloth_offline::cloth_offline(&args.scenes, &bench, |row| {
         bar.set_message(format!("{}, {}", row.scene, row.method));
         bar.inc(1);
     })?;
     bar.finish_and_clear();
-    table.command = std::env::args().collect::<Vec<_>>().join(" ");
     finish(&table, &args.out)
 }
 
 fn dress_offline(args: &ClothArgs, folder: &Path) -> Result<ExitCode> {
-    let bench = DressBench {
-        vertices: args.vertices,
-        frames: args.frames.unwrap_or(DRESS_FRAMES),
-        settings: OfflineSettings::default(),
-    };
-    let bar = progress(Some(bench.frames as u64), "measuring");
-    let mut table = tryon_bench::dress_offline::dress_offline(folder, bench, |_| bar.inc(1))?;
+    let frames = args.frames.unwrap_or(DRESS_FRAMES);
+    let bar = progress(Some(frames as u64), "measuring");
+    let table = tryon_bench::dress_offline::dress_offline(folder, frames, |_| bar.inc(1))?;
     bar.finish_and_clear();
-    table.command = std::env::args().collect::<Vec<_>>().join(" ");
     finish(&table, &args.out)
 }
 
-/// Runs `tryon-bench people`.
-///
-/// # Errors
-/// Scenes that cannot be read, or results that cannot be written.
-pub(crate) fn people(args: &PeopleArgs) -> Result<ExitCode> {
-    let cases = if args.unseen {
-        CaseSet::Unseen
-    } else {
-        CaseSet::Seen
-    };
-    let plan = PeoplePlan {
-        data: args.data.clone(),
-        cases,
-        quick: args.quick,
-        only: args.only.clone(),
-        pictures: args.pictures.clone(),
-    };
+/// Runs `tryon-bench dance`.
+pub(crate) fn dance(args: &DanceArgs) -> Result<ExitCode> {
+    let (worn, dance) = (&args.worn, load(&args.data)?);
+    eprintln!("fitted template {:.1} mm off", dance.fit * 1e3);
+    let outfit = worn.outfit()?;
+    let report = with_threads(worn.threads, || dance.run(&outfit, args.seconds))??;
+    let mut table = Table::new("dance", "one step of 1/60 s, median");
+    table.rows.push(report.row("live step"));
+    finish(&table, &worn.out)
+}
+
+/// Runs `tryon-bench standing`.
+pub(crate) fn standing(args: &StandingArgs) -> Result<ExitCode> {
+    let (worn, arms) = (&args.worn, args.arms.map(f64::to_radians));
+    let outfit = worn.outfit()?;
     let bar = progress(None, "measuring");
-    let mut table = with_threads(1, || {
-        people::run(&plan, |row| {
+    let mut table = Table::new("standing", "one step of 1/30 s, median");
+    with_threads(worn.threads, || {
+        measure_rest(&outfit, arms, args.steps, |row| {
+            bar.inc(1);
+            table.rows.push(row);
+        })
+    })??;
+    bar.finish_and_clear();
+    finish(&table, &worn.out)
+}
+
+/// Runs `tryon-bench people`.
+pub(crate) fn people(args: &PeopleArgs) -> Result<ExitCode> {
+    let bar = progress(None, "measuring");
+    let table = with_threads(1, || {
+        people::run(&args.plan, |row| {
             bar.set_message(format!("{row} done"));
             bar.inc(1);
         })
     })??;
     bar.finish_and_clear();
-    table.command = std::env::args().collect::<Vec<_>>().join(" ");
     for file in table.write(&args.out)? {
         println!("{}", file.display());
     }
@@ -137,9 +129,6 @@ pub(crate) fn people(args: &PeopleArgs) -> Result<ExitCode> {
 }
 
 /// Runs `tryon-bench clothcap`.
-///
-/// # Errors
-/// Scenes that cannot be read, or results that cannot be written.
 pub(crate) fn clothcap(args: &ClothcapArgs) -> Result<ExitCode> {
     let mut scenes = capture_scenes()?;
     let made = made_scenes(args.data.as_deref())?;
@@ -148,30 +137,13 @@ pub(crate) fn clothcap(args: &ClothcapArgs) -> Result<ExitCode> {
     let is_wanted = |name: &str| args.only.is_empty() || args.only.iter().any(|o| name.contains(o));
     scenes.retain(|s| is_wanted(&s.name));
     let mut turns = turn_scenes()?;
-    // Turns have one variant only.
-    let has_variants = args.ablation || args.sweep;
-    turns.retain(|s| !has_variants && s.is_unseen == args.unseen && is_wanted(&s.name));
-    let variants = match (args.sweep, args.ablation) {
-        (true, _) => CaptureVariant::sweep(),
-        (_, true) => CaptureVariant::all(),
-        _ => vec![CaptureVariant::whole()],
-    };
-    let runs = scenes.len() * variants.len() + turns.len();
-    let bar = progress(Some(runs as u64), "capturing");
-    let command = std::env::args().collect::<Vec<_>>().join(" ");
-    let run_time = if args.sweep {
-        "a later scan, everything"
-    } else {
-        "first scan, everything"
-    };
-    let mut table = Table::new("clothcap", command, run_time);
+    turns.retain(|s| s.is_unseen == args.unseen && is_wanted(&s.name));
+    let bar = progress(Some((scenes.len() + turns.len()) as u64), "capturing");
+    let mut table = Table::new("clothcap", "first scan, everything");
     for scene in &scenes {
-        with_threads(args.threads, || {
-            measure_all(scene, &variants, args.bodies, |row| {
-                table.rows.push(row);
-                bar.inc(1);
-            })
-        })??;
+        let row = with_threads(args.threads, || measure(scene, args.bodies))??;
+        table.rows.push(row);
+        bar.inc(1);
     }
     for scene in &turns {
         let rows = with_threads(args.threads, || measure_turn_scene(scene))??;
@@ -192,17 +164,4 @@ fn finish(table: &Table, out: &std::path::Path) -> Result<ExitCode> {
     }
     print!("{}", table.to_markdown());
     Ok(ExitCode::SUCCESS)
-}
-
-/// Command line that repeats the measurement.
-fn command(args: &TrackingArgs) -> String {
-    let data = args
-        .data
-        .as_ref()
-        .map_or(String::new(), |d| format!(" --data {}", d.display()));
-    let quick = if args.quick { " --quick" } else { "" };
-    format!(
-        "tryon-bench tracking --out {}{data}{quick}",
-        args.out.display()
-    )
 }

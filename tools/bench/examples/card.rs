@@ -6,6 +6,7 @@
 //! milliseconds, and the number of pixels that differ.
 #![allow(clippy::print_stdout, clippy::unwrap_used, clippy::expect_used)] // a development tool: stop at the first fault
 
+use clap::Parser;
 use std::path::PathBuf;
 use std::time::Instant;
 use tryon::body::Pose;
@@ -30,32 +31,21 @@ const FRAME: u64 = 60;
 /// Rounds before the timed ones.
 const WARM_UP: usize = 3;
 
+#[derive(Parser)]
 struct Args {
+    /// A software adapter.
+    #[arg(long)]
     software: bool,
+    /// Timed pictures of each size.
+    #[arg(long, default_value_t = 60)]
     rounds: usize,
+    /// Folder for the pictures.
+    #[arg(long)]
     out: Option<PathBuf>,
 }
 
-fn args() -> Args {
-    let mut a = Args {
-        software: false,
-        rounds: 60,
-        out: None,
-    };
-    let mut words = std::env::args().skip(1);
-    while let Some(word) = words.next() {
-        match word.as_str() {
-            "--software" => a.software = true,
-            "--rounds" => a.rounds = words.next().unwrap().parse().unwrap(),
-            "--out" => a.out = Some(words.next().unwrap().into()),
-            other => panic!("{other} is not understood"),
-        }
-    }
-    a
-}
-
 fn main() {
-    let args = args();
+    let args = Args::parse();
     let begun = Instant::now();
     let mut card = Renderer::new(args.software).expect("an adapter");
     println!("{:?}, ready after {:.0} ms", card.adapter(), ms(begun));

@@ -1,12 +1,12 @@
 //! Continuous collision detection against query sets with exact truth: missed impacts, false alarms and time.
 
+use super::EvaluateError;
+use super::ccd_queries::{CcdQuery, KINDS, find_ccd_queries, read_ccd_queries};
 use serde::Serialize;
 use std::hint::black_box;
 use std::path::Path;
 use std::time::Instant;
-use tryon_cloth::contact::ccd::{PairKind, PairMotion, has_impact, time_of_impact};
-use tryon_formats::FormatError;
-use tryon_formats::ccd_queries::{CcdQuery, CcdQuerySet, find_ccd_queries, read_ccd_queries};
+use tryon_cloth::contact::ccd::{PairMotion, has_impact, time_of_impact};
 use tryon_geometry::math::order_statistics::median;
 
 /// Calls timed together: one call is as short as reading the clock.
@@ -25,6 +25,9 @@ pub struct CcdAnswers {
     pub median_ns: f64,
     /// Mean time of one query, nanoseconds.
     pub mean_ns: f64,
+    /// Time of each query, nanoseconds.
+    #[serde(skip)]
+    times: Vec<f64>,
 }
 
 /// Result of one set of queries.
@@ -33,7 +36,7 @@ pub struct CcdScore {
     /// Group of the set.
     pub group: String,
     /// `vertex-face`, `edge-edge`, or `all`.
-    pub kind: String,
+    pub kind: &'static str,
     /// Number of queries.
     pub queries: usize,
     /// Queries whose truth is an impact.
@@ -60,96 +63,62 @@ pub struct CcdReport {
 ///
 /// # Errors
 /// When a file can't be read or is no query set.
-pub fn score_ccd(root: &Path) -> Result<CcdReport, FormatError> {
-    let mut total = Tally::default();
+pub fn score_ccd(root: &Path) -> Result<CcdReport, EvaluateError> {
+    let score = |group: &str, kind| CcdScore {
+        group: group.to_owned(),
+        kind,
+        ..CcdScore::default()
+    };
+    let mut total = score("total", "all");
     let mut sets = Vec::new();
     for set in find_ccd_queries(root)? {
-        let tally = Tally::of(&set)?;
-        let kind = match set.is_edge_edge {
-            true => "edge-edge",
-            false => "vertex-face",
-        };
-        sets.push(tally.score(&set.group, kind));
-        total.append(tally);
-    }
-    Ok(CcdReport {
-        sets,
-        total: total.score("total", "all"),
-    })
-}
-
-/// Counts and times of some queries.
-#[derive(Clone, Debug, Default)]
-struct Tally {
-    queries: usize,
-    impacts: usize,
-    rounded: usize,
-    decision: AnswerTally,
-    step: AnswerTally,
-}
-
-#[derive(Clone, Debug, Default)]
-struct AnswerTally {
-    missed: usize,
-    false_alarms: usize,
-    nanoseconds: Vec<f64>,
-}
-
-impl Tally {
-    fn of(set: &CcdQuerySet) -> Result<Self, FormatError> {
-        let kind = match set.is_edge_edge {
-            true => PairKind::EdgeEdge,
-            false => PairKind::VertexFace,
-        };
-        let mut tally = Self::default();
+        let (name, kind) = KINDS[set.kind];
+        let mut own = score(&set.group, name);
         for file in &set.files {
-            let queries = read_ccd_queries(file)?;
-            queries.iter().for_each(|q| tally.ask(kind, q));
+            let queries = read_ccd_queries(file, kind)?;
+            queries.iter().for_each(|q| own.ask(q));
         }
-        Ok(tally)
+        total.append(&own);
+        own.finish();
+        sets.push(own);
     }
+    total.finish();
+    Ok(CcdReport { sets, total })
+}
 
-    fn ask(&mut self, kind: PairKind, query: &CcdQuery) {
-        let motion = PairMotion {
-            kind,
-            start: query.start,
-            end: query.end,
-        };
-        let truth = query.has_impact;
+impl CcdScore {
+    fn ask(&mut self, query: &CcdQuery) {
+        let (motion, truth) = (&query.motion, query.has_impact);
         self.queries += 1;
         self.impacts += usize::from(truth);
         self.rounded += usize::from(!query.is_exact);
         let step = |m: &PairMotion| time_of_impact(m, 0.0).is_some();
-        self.step.ask(&motion, truth, step);
+        self.step.ask(motion, truth, step);
         if query.is_exact {
-            self.decision.ask(&motion, truth, has_impact);
+            self.decision.ask(motion, truth, has_impact);
         } else {
-            self.decision.ask(&motion, truth, step);
+            self.decision.ask(motion, truth, step);
         }
     }
 
-    fn append(&mut self, other: Self) {
+    fn append(&mut self, other: &Self) {
         self.queries += other.queries;
         self.impacts += other.impacts;
         self.rounded += other.rounded;
-        self.decision.append(other.decision);
-        self.step.append(other.step);
+        self.decision.append(&other.decision);
+        self.step.append(&other.step);
     }
 
-    fn score(&self, group: &str, kind: &str) -> CcdScore {
-        CcdScore {
-            group: group.to_owned(),
-            kind: kind.to_owned(),
-            queries: self.queries,
-            impacts: self.impacts,
-            rounded: self.rounded,
-            decision: self.decision.answers(),
-            step: self.step.answers(),
+    fn finish(&mut self) {
+        for answers in [&mut self.decision, &mut self.step] {
+            let times = &answers.times;
+            answers.mean_ns = times.iter().sum::<f64>() / times.len().max(1) as f64;
+            answers.median_ns = median(&mut times.clone()).unwrap_or(0.0);
         }
     }
 }
 
-impl AnswerTally {
+impl CcdAnswers {
     fn ask(&mut self, motion: &PairMotion, truth: bool, query: impl Fn(&PairMotion) -> bool) {
         let mut answer = false;
         let mut shortest = f64::INFINITY;
@@ -160,25 +129,15 @@ impl AnswerTally {
             }
             shortest = shortest.min(start.elapsed().as_secs_f64());
         }
-        self.nanoseconds.push(shortest * 1e9 / f64::from(CALLS));
+        self.times.push(shortest * 1e9 / f64::from(CALLS));
         self.missed += usize::from(truth && !answer);
         self.false_alarms += usize::from(answer && !truth);
     }
 
-    fn append(&mut self, other: Self) {
+    fn append(&mut self, other: &Self) {
         self.missed += other.missed;
         self.false_alarms += other.false_alarms;
-        self.nanoseconds.extend(other.nanoseconds);
-    }
-
-    fn answers(&self) -> CcdAnswers {
-        let times = &self.nanoseconds;
-        CcdAnswers {
-            missed: self.missed,
-            false_alarms: self.false_alarms,
-            median_ns: median(&mut times.clone()).unwrap_or(0.0),
-            mean_ns: times.iter().sum::<f64>() / times.len().max(1) as f64,
-        }
+        self.times.extend(&other.times);
     }
 }
 
@@ -210,10 +169,7 @@ mod tests {
         std::fs::write(folder.join("b.csv"), wrong).expect("a file");
         let report = score_ccd(root.path()).expect("a report");
         let set = &report.sets[0];
-        assert_eq!(
-            (set.group.as_str(), set.kind.as_str()),
-            ("drops", "vertex-face")
-        );
+        assert_eq!((set.group.as_str(), set.kind), ("drops", "vertex-face"));
         assert_eq!((set.queries, set.impacts, set.rounded), (5, 2, 0));
         for answers in [&set.decision, &set.step, &report.total.decision] {
             assert_eq!((answers.missed, answers.false_alarms), (1, 1));

@@ -9,28 +9,15 @@ use tryon_formats::npy::read_npy;
 use tryon_geometry::math::P3;
 use tryon_geometry::par::Par;
 
-/// Scenes measured.
-#[derive(Clone, Debug, PartialEq)]
-pub struct ClothBench {
-    /// Scene names: files of the scenes folder without extension.
-    pub scenes: Vec<String>,
-}
-
-impl Default for ClothBench {
-    fn default() -> Self {
-        let scenes = [
-            "A_pin_1k",
-            "A_pin_5k",
-            "B_sphere_1k",
-            "C_skirt_1k",
-            "C_skirt_5k",
-            "C_skirt_10k",
-        ];
-        Self {
-            scenes: scenes.map(str::to_owned).to_vec(),
-        }
-    }
-}
+/// Scenes measured: files of the scenes folder without extension.
+pub const SCENES: [&str; 6] = [
+    "A_pin_1k",
+    "A_pin_5k",
+    "B_sphere_1k",
+    "C_skirt_1k",
+    "C_skirt_5k",
+    "C_skirt_10k",
+];
 
 /// Settings of the live step on a scene.
 #[derive(Clone, Copy)]
@@ -44,36 +31,15 @@ struct Variant {
 }
 
 /// Variants measured, the settings of scenes first.
+#[rustfmt::skip]
 const VARIANTS: [Variant; 5] = {
-    let whole = Variant {
-        name: "live step",
-        patches: 1,
-        self_collision: true,
-        most_steps: None,
-    };
+    let whole = Variant { name: "live step", patches: 1, self_collision: true, most_steps: None };
     [
         whole,
-        Variant {
-            name: "live step, two threads",
-            patches: 2,
-            ..whole
-        },
-        Variant {
-            name: "without self-contact",
-            self_collision: false,
-            ..whole
-        },
-        Variant {
-            name: "substeps of worn garments",
-            most_steps: Some(72),
-            ..whole
-        },
-        Variant {
-            name: "the same on two threads",
-            patches: 2,
-            most_steps: Some(72),
-            ..whole
-        },
+        Variant { name: "live step, two threads", patches: 2, ..whole },
+        Variant { name: "without self-contact", self_collision: false, ..whole },
+        Variant { name: "substeps of worn garments", most_steps: Some(72), ..whole },
+        Variant { name: "the same on two threads", patches: 2, most_steps: Some(72), ..whole },
     ]
 };
 
@@ -94,26 +60,19 @@ impl Variant {
     }
 }
 
-/// Runs every variant on every scene of `folder`; `progress` receives each row.
+/// Runs every variant on `scenes` of `folder`; `progress` receives each row.
 ///
 /// # Errors
 /// A scene that cannot be read. A variant that diverges is a row with error `diverged` 1.
 pub fn cloth(
     folder: &Path,
-    bench: &ClothBench,
+    scenes: &[String],
     mut progress: impl FnMut(&Row),
 ) -> Result<Table, EvaluateError> {
-    let mut table = Table {
-        name: "cloth".into(),
-        command: "tryon-bench cloth".into(),
-        run_time: "milliseconds for 1/60 s of cloth, median over the scene".into(),
-        rows: Vec::new(),
-    };
-    for name in &bench.scenes {
-        let fault = |e: SceneError| EvaluateError::Scene {
-            scene: name.clone(),
-            why: e.to_string(),
-        };
+    let run_time = "milliseconds for 1/60 s of cloth, median over the scene";
+    let mut table = Table::new("cloth", run_time);
+    for name in scenes {
+        let fault = |e: SceneError| EvaluateError::new(name, e);
         let scene = load(&folder.join(format!("{name}.json"))).map_err(fault)?;
         let reference = reference(folder, name, &scene);
         for variant in &VARIANTS {

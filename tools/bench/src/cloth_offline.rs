@@ -21,67 +21,73 @@ pub struct OfflineBench {
     pub frames: usize,
 }
 
-impl Default for OfflineBench {
-    fn default() -> Self {
-        let scenes = ["A_pin_1k", "A_pin_5k", "B_sphere_1k", "C_skirt_1k"];
-        Self {
-            scenes: scenes.map(str::to_owned).to_vec(),
-            full: false,
-            frames: usize::MAX,
-        }
-    }
+/// Scenes measured: files of the scenes folder without extension.
+pub const SCENES: [&str; 4] = ["A_pin_1k", "A_pin_5k", "B_sphere_1k", "C_skirt_1k"];
+
+/// Settings of the offline solver.
+#[derive(Clone, Copy)]
+struct OfflineVariant {
+    scheme: TimeScheme,
+    linear: LinearMethod,
+    /// Steps a second; `None`: as the error allows.
+    steps: Option<u32>,
 }
 
-/// A time scheme, a linear solver, and the steps a second; `None`: as the error allows.
-type Variant = (TimeScheme, LinearMethod, Option<u32>);
-
 /// Variants measured, the defaults first.
-const VARIANTS: [Variant; 11] = {
+const VARIANTS: [OfflineVariant; 7] = {
     use LinearMethod::{Cholesky, ConjugateGradient, TwoLevel};
     use TimeScheme::{Bdf2, ImplicitEuler};
+    const fn of(scheme: TimeScheme, linear: LinearMethod, steps: Option<u32>) -> OfflineVariant {
+        OfflineVariant {
+            scheme,
+            linear,
+            steps,
+        }
+    }
     [
-        (Bdf2, TwoLevel, None),
-        (Bdf2, TwoLevel, Some(120)),
-        (Bdf2, TwoLevel, Some(240)),
-        (Bdf2, TwoLevel, Some(480)),
-        (Bdf2, ConjugateGradient, Some(240)),
-        (Bdf2, Cholesky, Some(240)),
-        (ImplicitEuler, TwoLevel, Some(120)),
-        (ImplicitEuler, TwoLevel, Some(240)),
-        (ImplicitEuler, TwoLevel, Some(480)),
-        (ImplicitEuler, Cholesky, Some(240)),
-        (Bdf2, ConjugateGradient, None),
+        of(Bdf2, TwoLevel, None),
+        of(Bdf2, TwoLevel, Some(120)),
+        of(Bdf2, TwoLevel, Some(240)),
+        of(Bdf2, TwoLevel, Some(480)),
+        of(Bdf2, Cholesky, Some(240)),
+        of(ImplicitEuler, TwoLevel, Some(480)),
+        of(Bdf2, ConjugateGradient, None),
     ]
 };
 /// Scenes with more vertices than this run the defaults alone unless asked for.
 const LARGE: usize = 2000;
 
-/// Name of a variant in tables; its rows differ in their steps.
-fn name((scheme, linear, steps): Variant) -> String {
-    let scheme = match scheme {
-        TimeScheme::Bdf2 => "BDF2",
-        TimeScheme::ImplicitEuler => "implicit Euler",
-    };
-    let linear = match linear {
-        LinearMethod::TwoLevel => "two levels",
-        LinearMethod::ConjugateGradient => "conjugate gradients",
-        LinearMethod::Cholesky => "Cholesky",
-    };
-    let steps = if steps.is_none() { ", adaptive" } else { "" };
-    format!("{scheme}, {linear}{steps}")
-}
-
-fn settings((scheme, linear, steps): Variant) -> OfflineSettings {
-    let mut settings = OfflineSettings {
-        scheme,
-        ..OfflineSettings::default()
-    };
-    settings.newton.linear = linear;
-    if let Some(steps) = steps {
-        settings.longest_step = 1.0 / f64::from(steps);
-        settings.error_rate = f64::INFINITY;
+impl OfflineVariant {
+    /// Name in tables; rows of one name differ in their steps.
+    fn name(&self) -> String {
+        let scheme = match self.scheme {
+            TimeScheme::Bdf2 => "BDF2",
+            TimeScheme::ImplicitEuler => "implicit Euler",
+        };
+        let linear = match self.linear {
+            LinearMethod::TwoLevel => "two levels",
+            LinearMethod::ConjugateGradient => "conjugate gradients",
+            LinearMethod::Cholesky => "Cholesky",
+        };
+        let steps = match self.steps {
+            Some(_) => "",
+            None => ", adaptive",
+        };
+        format!("{scheme}, {linear}{steps}")
     }
-    settings
+
+    fn settings(&self) -> OfflineSettings {
+        let mut settings = OfflineSettings {
+            scheme: self.scheme,
+            ..OfflineSettings::default()
+        };
+        settings.newton.linear = self.linear;
+        if let Some(steps) = self.steps {
+            settings.longest_step = 1.0 / f64::from(steps);
+            settings.error_rate = f64::INFINITY;
+        }
+        settings
+    }
 }
 
 /// Runs the variants on every scene of `folder`; `progress` receives each row.
@@ -94,12 +100,9 @@ pub fn cloth_offline(
     mut progress: impl FnMut(&Row),
 ) -> Result<Table, EvaluateError> {
     let run_time = "milliseconds for 1/60 s of cloth, median over the scene";
-    let mut table = Table::new("cloth-offline", "tryon-bench cloth --offline", run_time);
+    let mut table = Table::new("cloth-offline", run_time);
     for scene_name in &bench.scenes {
-        let fault = |why: String| EvaluateError::Scene {
-            scene: scene_name.clone(),
-            why,
-        };
+        let fault = |why: String| EvaluateError::new(scene_name, why);
         let path = folder.join(format!("{scene_name}.json"));
         let scene = load(&path).map_err(|e| fault(e.to_string()))?;
         let offline = OfflineScene::new(&scene).map_err(|e| fault(e.to_string()))?;
@@ -109,8 +112,8 @@ pub fn cloth_offline(
             .into_iter()
             .take(if is_large { 1 } else { VARIANTS.len() })
         {
-            let run = Run::of(&scene, &offline, variant, bench.frames);
-            let row = run.row(scene_name, variant);
+            let run = Run::of(&scene, &offline, &variant, bench.frames);
+            let row = run.row(scene_name, &variant);
             let row = match &reference {
                 Some(reference) => reference_errors(row, &run.frames, reference),
                 None => row,
@@ -136,7 +139,12 @@ struct Run {
 }
 
 impl Run {
-    fn of(scene: &Scene, offline: &OfflineScene<'_>, variant: Variant, most: usize) -> Self {
+    fn of(
+        scene: &Scene,
+        offline: &OfflineScene<'_>,
+        variant: &OfflineVariant,
+        most: usize,
+    ) -> Self {
         let mut run = Self {
             vertices: scene.start.len(),
             rate: scene.rate,
@@ -146,7 +154,7 @@ impl Run {
             is_solved: true,
         };
         let mut before = 0.0;
-        let end = offline.run(&settings(variant), Par::Rayon, None, |done, solver| {
+        let end = offline.run(&variant.settings(), Par::Rayon, None, |done, solver| {
             run.frames.push(solver.state().positions());
             run.work.push(done.report);
             run.seconds.push(done.seconds[0] - before);
@@ -162,13 +170,13 @@ impl Run {
     }
 
     /// Row without the distances from a reference.
-    fn row(&self, scene: &str, variant: Variant) -> Row {
+    fn row(&self, scene: &str, variant: &OfflineVariant) -> Row {
         let median = median(&mut self.seconds.clone()).unwrap_or(f64::NAN);
         let sum = |count: fn(&OfflineFrameReport) -> usize| -> usize {
             self.work.iter().map(count).sum()
         };
         let mean = |total: usize| total as f64 / self.work.len().max(1) as f64;
-        Row::new(scene, name(variant), median * self.rate / 60.0 * 1e3)
+        Row::new(scene, variant.name(), median * self.rate / 60.0 * 1e3)
             .with("vertices", self.vertices)
             .with("steps_per_frame", format!("{:.1}", mean(sum(|w| w.steps))))
             .with(
@@ -190,10 +198,10 @@ mod tests {
 
     #[test]
     fn fixed_steps_ignore_the_error() {
-        let fixed = settings(VARIANTS[3]);
+        let fixed = VARIANTS[3].settings();
         assert!(fixed.error_rate.is_infinite());
         assert!((fixed.longest_step - 1.0 / 480.0).abs() < 1e-12);
-        assert_eq!(settings(VARIANTS[0]), OfflineSettings::default());
-        assert_eq!(name(VARIANTS[0]), "BDF2, two levels, adaptive");
+        assert_eq!(VARIANTS[0].settings(), OfflineSettings::default());
+        assert_eq!(VARIANTS[0].name(), "BDF2, two levels, adaptive");
     }
 }

@@ -10,22 +10,21 @@ use tryon_geometry::mesh::TriMesh;
 const BODIES: &str = "rumba_dancing_121x12811x3_f32le.bin.gz";
 const FACES: &str = "wm2_15k.obj";
 /// Time between two bodies (s).
-const INTERVAL: f64 = 0.04;
+fn interval() -> f64 {
+    1.0 / 25.0
+}
 
 /// A dancing body without a known template.
 #[derive(Clone, Debug)]
-pub struct DanceBodies {
+pub(super) struct DanceBodies {
     /// The first one (world, metres).
-    pub mesh: TriMesh,
+    pub(super) mesh: TriMesh,
     /// Vertices of each, world, metres, shape `(bodies, vertices)`.
-    pub bodies: Vec<Vec<P3>>,
+    bodies: Vec<Vec<P3>>,
 }
 
 pub(super) fn fault(why: impl ToString) -> EvaluateError {
-    EvaluateError::Scene {
-        scene: "dance".into(),
-        why: why.to_string(),
-    }
+    EvaluateError::new("dance", why)
 }
 
 impl DanceBodies {
@@ -33,7 +32,7 @@ impl DanceBodies {
     ///
     /// # Errors
     /// A file that is missing or does not fit the others.
-    pub fn read(folder: &Path) -> Result<Self, EvaluateError> {
+    pub(super) fn read(folder: &Path) -> Result<Self, EvaluateError> {
         let faces = read_obj(&folder.join(FACES)).map_err(fault)?.mesh;
         let mut bytes = Vec::new();
         std::fs::File::open(folder.join(BODIES))
@@ -67,8 +66,8 @@ impl DanceBodies {
     }
 
     /// Body at a time (s), interpolated between its two neighbours (m).
-    pub fn at(&self, time: f64) -> Vec<P3> {
-        let at = (time / INTERVAL).clamp(0.0, (self.bodies.len() - 1) as f64);
+    pub(super) fn at(&self, time: f64) -> Vec<P3> {
+        let at = (time / interval()).clamp(0.0, (self.bodies.len() - 1) as f64);
         let (i, share) = (at as usize, at.fract() as f32);
         let next = &self.bodies[(i + 1).min(self.bodies.len() - 1)];
         let between = self.bodies[i].iter().zip(next);
@@ -76,7 +75,7 @@ impl DanceBodies {
     }
 
     /// Length of the dance (s).
-    pub fn seconds(&self) -> f64 {
-        (self.bodies.len() - 1) as f64 * INTERVAL
+    pub(super) fn seconds(&self) -> f64 {
+        (self.bodies.len() - 1) as f64 * interval()
     }
 }

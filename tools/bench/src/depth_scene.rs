@@ -53,10 +53,7 @@ impl DepthScene {
         let name = folder
             .file_name()
             .map_or_else(|| "scene".to_owned(), |n| n.to_string_lossy().into_owned());
-        let fault = |why: String| EvaluateError::Scene {
-            scene: name.clone(),
-            why,
-        };
+        let fault = |why: String| EvaluateError::new(&name, why);
         let mut source = open_recording(folder).map_err(|e| fault(e.to_string()))?;
         let calibration = source.calibration().clone();
         let mut frames = Vec::new();
@@ -79,42 +76,30 @@ impl DepthScene {
         };
         let file: TruthFile =
             serde_json::from_str(&text).map_err(|e| fault(format!("truth.json: {e}")))?;
-        if file.joints.len() != scene.frames.len()
-            || file
-                .joints
-                .iter()
-                .any(|j| j.len() != file.joint_names.len())
-        {
-            return Err(fault(format!(
-                "truth.json: {} frames for {}",
-                file.joints.len(),
-                scene.frames.len()
-            )));
+        let (found, wanted) = (file.joints.len(), scene.frames.len());
+        let is_whole = |j: &Vec<[f64; 3]>| j.len() == file.joint_names.len();
+        if found != wanted || !file.joints.iter().all(is_whole) {
+            return Err(fault(format!("truth.json: {found} frames for {wanted}")));
         }
+        let truth = |joints: &Vec<[f64; 3]>| SceneTruth {
+            joints: joints.iter().map(|p| P3d::from(*p)).collect(),
+            vertices: vec![],
+        };
+        scene.truth = file.joints.iter().map(truth).collect();
         scene.joint_names = file.joint_names;
-        scene.truth = file
-            .joints
-            .iter()
-            .map(|j| SceneTruth {
-                joints: j.iter().map(|p| P3d::from(*p)).collect(),
-                vertices: vec![],
-            })
-            .collect();
         let path = folder.join("truth_vertices.npy");
-        if path.exists() {
-            let (shape, values) = read_npy(&path).map_err(|e| fault(e.to_string()))?;
-            let [_, n, 3] = shape[..] else {
-                return Err(fault(format!("truth_vertices.npy: shape {shape:?}")));
-            };
-            for (k, block) in values.chunks_exact(3 * n.max(1) as usize).enumerate() {
-                let Some(truth) = scene.truth.get_mut(k * VERTEX_INTERVAL) else {
-                    break;
-                };
-                let Some(origin) = truth.joints.first().map(|p| p.coords.cast::<f32>()) else {
-                    continue;
-                };
-                truth.vertices = block
-                    .chunks_exact(3)
+        if !path.exists() {
+            return Ok(scene);
+        }
+        let (shape, values) = read_npy(&path).map_err(|e| fault(e.to_string()))?;
+        let [_, n, 3] = shape[..] else {
+            return Err(fault(format!("truth_vertices.npy: shape {shape:?}")));
+        };
+        let blocks = values.chunks_exact(3 * n.max(1) as usize);
+        for (truth, block) in scene.truth.iter_mut().step_by(VERTEX_INTERVAL).zip(blocks) {
+            if let Some(origin) = truth.joints.first().map(|p| p.coords.cast::<f32>()) {
+                let vertices = block.chunks_exact(3);
+                truth.vertices = vertices
                     .map(|v| P3::new(v[0], v[1], v[2]) + origin)
                     .collect();
             }

@@ -1,7 +1,6 @@
 //! The sewn dress of Codim-IPC on its dancing body by the offline solver: time, work and intersections of each frame.
 
 use super::dance_bodies::{DanceBodies, fault};
-use super::sewn_sheet::SewnSheet;
 use super::{EvaluateError, Row, Table};
 use nalgebra::Vector2;
 use std::ops::ControlFlow;
@@ -14,36 +13,38 @@ use tryon_cloth::fine::{
     OfflineSettings, OfflineSolver, OfflineState, StitchSprings,
 };
 use tryon_formats::obj::read_obj;
-use tryon_formats::sewn_obj::read_sewn_obj;
+use tryon_formats::sewn_obj::{Stitch, read_sewn_obj};
 use tryon_garment::Material;
 use tryon_geometry::math::{P3, V3d};
+use tryon_geometry::mesh::Face;
 use tryon_geometry::par::Par;
+use tryon_geometry::settings;
 
-/// Panels as cut with their stitches, and the same vertices draped on the standing body, 0.75 m below the dance.
+/// Panels as cut with their stitches, and the same vertices draped on the standing body.
 const FILES: [&str; 2] = ["dress_knife/stage.obj", "dress_knife/drape.obj"];
-const BELOW: f64 = 0.75;
-/// Fabric; C-IPC's dresses are of cotton too.
-const FABRIC: &str = "cotton";
-/// Stiffness of a stitch (N/m): about that of cotton's membrane, so that seams give as the cloth does.
-const STITCH: f64 = 1e3;
-/// Time between frames (s).
-const FRAME: f64 = 1.0 / 30.0;
 
-/// The dress, draped, and the dance.
-pub struct DressScene {
-    sheet: SewnSheet,
-    bodies: DanceBodies,
+settings! {
+    /// Settings of the scene.
+    pub struct DressSceneSettings {
+        /// Frames a second of the dance.
+        pub rate: f64 = 30.0,
+        /// Height of the dance over the draped dress of the files (m).
+        pub above: f64 = 0.75,
+        /// Stiffness of a stitch (N/m): about that of cotton's membrane, so that seams give as the cloth does.
+        pub stitch: f64 = 1e3,
+    }
 }
 
-/// Extent of the measurement.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct DressBench {
-    /// Vertices of the dress; no fewer than the file has.
-    pub vertices: usize,
-    /// Frames of 1/30 s.
-    pub frames: usize,
-    /// Solver; friction is the fabric's.
-    pub settings: OfflineSettings,
+/// The dress, draped, and the dance.
+struct DressScene {
+    settings: DressSceneSettings,
+    faces: Vec<Face>,
+    /// Material coordinates (m), shape `[vertices]`.
+    flat: Vec<Vector2<f64>>,
+    /// Positions (m), shape `[vertices]`.
+    x: Vec<V3d>,
+    stitches: Vec<Stitch>,
+    bodies: DanceBodies,
 }
 
 fn vectors(points: &[P3]) -> Vec<V3d> {
@@ -51,11 +52,8 @@ fn vectors(points: &[P3]) -> Vec<V3d> {
 }
 
 impl DressScene {
-    /// Reads dress and dance of `folder`, and divides the dress.
-    ///
-    /// # Errors
-    /// A file that is missing or does not fit the others.
-    pub fn load(folder: &Path, vertices: usize) -> Result<Self, EvaluateError> {
+    fn load(folder: &Path) -> Result<Self, EvaluateError> {
+        let settings = DressSceneSettings::default();
         let [stage, drape] = FILES.map(|f| folder.join(f));
         let panels = read_sewn_obj(&stage).map_err(fault)?;
         let draped = read_obj(&drape).map_err(fault)?;
@@ -70,29 +68,22 @@ impl DressScene {
                 flat[*v as usize] = Vector2::from(panels.obj.uv[*c as usize]).cast();
             }
         }
-        let above = V3d::new(0.0, BELOW, 0.0);
-        let mut sheet = SewnSheet {
+        let above = V3d::new(0.0, settings.above, 0.0);
+        Ok(Self {
+            settings,
             faces: panels.obj.mesh.faces().to_vec(),
             flat,
             x: vectors(places).iter().map(|p| p + above).collect(),
             stitches: panels.stitches,
-        };
-        sheet.divide(vertices);
-        let bodies = DanceBodies::read(folder)?;
-        Ok(Self { sheet, bodies })
+            bodies: DanceBodies::read(folder)?,
+        })
     }
 
-    /// Drapes the dress on the standing body, then simulates the dance from there; `progress` receives the row of each.
-    ///
-    /// # Errors
-    /// A start that intersects, a step that is not solved.
-    pub fn run(
-        &self,
-        bench: &DressBench,
-        par: Par,
-        mut progress: impl FnMut(Row),
-    ) -> Result<(), EvaluateError> {
-        let material = Material::preset(FABRIC).map_err(fault)?;
+    /// Drapes the dress on the standing body, then simulates frames of the dance; `progress` receives the row of each.
+    fn run(&self, frames: usize, mut progress: impl FnMut(Row)) -> Result<(), EvaluateError> {
+        let par = Par::Rayon;
+        // C-IPC's dresses are of cotton too.
+        let material = Material::preset("cotton").map_err(fault)?;
         let cloth = self.cloth(&material)?;
         let body = vectors(&self.bodies.at(0.0));
         let faces = self.bodies.mesh.faces();
@@ -101,8 +92,8 @@ impl DressScene {
             faces,
         };
         let mesh = cloth.contact_mesh(obstacle).map_err(fault)?;
-        let state = start(&mesh, &self.sheet.x, body, par)?;
-        let mut settings = bench.settings;
+        let state = start(&mesh, &self.x, body, par)?;
+        let mut settings = OfflineSettings::default();
         if let Some(contact) = &mut settings.contact {
             contact.friction = material.friction;
         }
@@ -125,14 +116,15 @@ impl DressScene {
             row.with("repeated_steps", work.unsolved),
             &work.newton,
         ));
-        for frame in 1..=bench.frames {
-            let obstacle = vectors(&self.bodies.at(frame as f64 * FRAME));
+        let interval = 1.0 / self.settings.rate;
+        for frame in 1..=frames {
+            let obstacle = vectors(&self.bodies.at(frame as f64 * interval));
             let targets = FrameTargets {
                 obstacle: &obstacle,
                 ..FrameTargets::default()
             };
             let started = Instant::now();
-            let work = solver.advance(FRAME, &targets).map_err(fault)?;
+            let work = solver.advance(interval, &targets).map_err(fault)?;
             let row = measured(&format!("frame {frame}"), started, &solver)
                 .with("steps", work.steps)
                 .with("repeated_steps", work.inaccurate + work.unsolved);
@@ -149,18 +141,17 @@ impl DressScene {
     }
 
     fn cloth(&self, material: &Material) -> Result<OfflineCloth, EvaluateError> {
-        let sheet = &self.sheet;
-        let rest = RestSheet::flat(sheet.faces.clone(), &sheet.flat).map_err(fault)?;
+        let rest = RestSheet::flat(self.faces.clone(), &self.flat).map_err(fault)?;
         let seams = StitchSprings {
-            stitches: sheet.stitches.clone(),
-            stiffness: STITCH,
+            stitches: self.stitches.clone(),
+            stiffness: self.settings.stitch,
         };
         let gravity = V3d::new(0.0, -9.81, 0.0);
-        OfflineCloth::of_sewn_sheet(&rest, sheet.x.len(), material, seams, gravity).map_err(fault)
+        OfflineCloth::of_sewn_sheet(&rest, self.x.len(), material, seams, gravity).map_err(fault)
     }
 }
 
-/// Dress at rest on the body, freed where the middles of edges on seams were rounded across.
+/// Dress at rest on the body, freed of crossings.
 fn start(
     mesh: &ContactMesh,
     dress: &[V3d],
@@ -184,19 +175,18 @@ fn newton(row: Row, work: &NewtonReport) -> Row {
         .with("evaluations", work.evaluations)
 }
 
-/// Measures the dress of `folder` (`../shared/data/garments/cipc_apache2`); `progress` receives each row.
+/// Measures a drape and `frames` of the dress of `folder` (`../shared/data/garments/cipc_apache2`); `progress` receives each row.
 ///
 /// # Errors
 /// A file that does not fit; a step that is not solved.
 pub fn dress_offline(
     folder: &Path,
-    bench: DressBench,
+    frames: usize,
     mut progress: impl FnMut(&Row),
 ) -> Result<Table, EvaluateError> {
     let run_time = "milliseconds for a drape, and for 1/30 s of dance";
-    let mut table = Table::new("dress-offline", "tryon-bench cloth --offline", run_time);
-    let scene = DressScene::load(folder, bench.vertices)?;
-    scene.run(&bench, Par::Rayon, |row| {
+    let mut table = Table::new("dress-offline", run_time);
+    DressScene::load(folder)?.run(frames, |row| {
         progress(&row);
         table.rows.push(row);
     })?;

@@ -1,6 +1,6 @@
-//! Run time against error: standard scenes, methods side by side, tables and plots behind `tryon-bench`.
+//! Run time against error: standard scenes, methods side by side and tables behind `tryon-bench`.
 //!
-//! A benchmark fills a [`Table`]; [`Table::write`] leaves it as CSV, JSON and one SVG plot per measure of error.
+//! A benchmark fills a [`Table`]; [`Table::write`] leaves it as Markdown and JSON.
 //!
 //! # Ideas
 //!
@@ -18,12 +18,12 @@
 //! - Dressed scans with truth per point: [`mod@scans::scene`].
 //! - The embedded body: [`mod@made_body::figure`] (proportions), [`mod@made_body::field`] (surface),
 //!   [`mod@made_body::rig`], [`mod@made_body::directions`] (shape space), [`mod@made_body::statistics`] (published measurements).
-//! - Ablation: [`mod@ablation`].
+//! - The tracker and the paper's form side by side: [`mod@tracking_plan`].
 //! - Everyone who walks in, the bars of a release: [`mod@people::plan`], a file a row beside it.
 #![allow(rustdoc::private_intra_doc_links)] // the index of ideas names private modules
 
-pub mod ablation;
 pub mod ccd;
+mod ccd_queries;
 pub mod cloth;
 pub mod cloth_offline;
 mod corruptions;
@@ -37,22 +37,18 @@ mod inside;
 pub mod made_body;
 mod outfit;
 pub mod parts;
-pub mod parts_recorded;
 pub mod people;
-mod plot;
 pub mod rest;
 pub mod scans;
 pub mod scenes;
-mod sewn_sheet;
-pub mod stills;
+mod sheet;
 mod table;
 pub mod tracking;
-mod write;
+pub mod tracking_plan;
 
-pub use dance_bodies::DanceBodies;
 pub use depth_scene::{DepthScene, SceneTruth};
 pub use error::EvaluateError;
 pub use inside::Solid;
 pub use outfit::OutfitSpec;
-pub use plot::run_time_against_error;
+pub use sheet::Sheet;
 pub use table::{Row, Table};

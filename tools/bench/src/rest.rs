@@ -1,6 +1,6 @@
 //! Sleeping cloth under test: a subject who stands, waves one arm or walks off.
 
-use super::{EvaluateError, OutfitSpec};
+use super::{EvaluateError, OutfitSpec, Row};
 use rand::{Rng, SeedableRng};
 use std::sync::Arc;
 use std::time::Instant;
@@ -12,8 +12,8 @@ use tryon_geometry::math::order_statistics::{median, percentile};
 use tryon_geometry::math::{Body, P3, Rigid, V3, World};
 use tryon_geometry::par::Par;
 
-/// Time of a step (s).
-const DT: f64 = 1.0 / 30.0;
+/// Steps a second.
+const RATE: u32 = 30;
 /// Steps before anything moves: long enough to fall asleep.
 const QUIET: usize = 60;
 
@@ -46,10 +46,7 @@ pub struct RestReport {
 }
 
 fn fault(why: impl ToString) -> EvaluateError {
-    EvaluateError::Scene {
-        scene: "standing".into(),
-        why: why.to_string(),
-    }
+    EvaluateError::new("standing", why)
 }
 
 /// Dressed subject at rest.
@@ -96,27 +93,15 @@ impl RestingSubject {
         };
         for (joint, turn) in ["left_shoulder", "left_elbow"].iter().zip(turns) {
             // The last angle: about z of the shoulder, the only one of the elbow.
-            let last = |j: usize| {
-                (skeleton.dof_offset(j) + skeleton.joints()[j].motion.dofs()).checked_sub(1)
-            };
-            if let Some(angle) = skeleton
-                .index(joint)
-                .and_then(last)
-                .and_then(|k| pose.angles.get_mut(k))
-            {
-                *angle += turn;
+            if let Some(j) = skeleton.index(joint) {
+                let end = skeleton.dof_offset(j) + skeleton.joints()[j].motion.dofs();
+                pose.angles[end - 1] += turn;
             }
         }
         let mut bones = BoneTransforms::default();
         pose.bones(skeleton, &self.rest, &mut bones);
-        let mut body = Vec::new();
-        skin(
-            Par::Rayon,
-            &self.rest.vertices,
-            self.template.weights(),
-            &bones,
-            &mut body,
-        );
+        let (mut body, weights) = (Vec::new(), self.template.weights());
+        skin(Par::Rayon, &self.rest.vertices, weights, &bones, &mut body);
         if motion == Motion::WalkingOff {
             let by = V3::new(0.0, 0.0, (0.6 * time.max(0.0)) as f32);
             body.iter_mut().for_each(|p| *p += by);
@@ -138,10 +123,11 @@ impl RestingSubject {
         let before = self.dressed.model.replace_config(config.clone());
         let mut state: State = self.dressed.state.clone();
         let (mut work, mut report) = (Workspace::default(), RestReport::default());
+        let dt = 1.0 / f64::from(RATE);
         let total: usize = state.garments.iter().map(|g| g.positions.len()).sum();
         let mut rng = rand_pcg::Pcg32::seed_from_u64(17);
         for index in 0..QUIET + steps {
-            let mut body = self.body(motion, (index as f64 - QUIET as f64) * DT);
+            let mut body = self.body(motion, (index as f64 - QUIET as f64) * dt);
             let mut some = || noise * rng.random_range(-1.0f32..1.0);
             let (whole, wave) = (
                 V3::new(some(), some(), some()),
@@ -150,10 +136,7 @@ impl RestingSubject {
             body.iter_mut()
                 .for_each(|p| *p += whole + wave * (7.0 * p.y).sin());
             let started = Instant::now();
-            let input = Input {
-                body: &body,
-                dt: DT,
-            };
+            let input = Input { body: &body, dt };
             let r = step(&self.dressed.model, &mut state, &input, &mut work).map_err(fault)?;
             if index >= QUIET {
                 report.ms.push(started.elapsed().as_secs_f64() * 1e3);
@@ -171,13 +154,16 @@ impl RestingSubject {
 }
 
 impl RestReport {
-    /// Median time of a step (ms).
-    pub fn median_ms(&self) -> f64 {
-        median(&mut self.ms.clone()).unwrap_or(0.0)
-    }
-    /// Mean time of a step (ms).
-    pub fn mean_ms(&self) -> f64 {
-        self.ms.iter().sum::<f64>() / self.ms.len().max(1) as f64
+    /// Row of a benchmark: median time of a step, and how far the cloth is from that of a run that never sleeps.
+    fn row(&self, scene: &str, method: &str, truth: &Self) -> Row {
+        let ms = median(&mut self.ms.clone()).unwrap_or(0.0);
+        let [rms, p99, most] = self.apart(truth).map(|m| m * 1e3);
+        Row::new(scene, method, ms)
+            .with("asleep", format!("{:.2}", self.mean_asleep()))
+            .error("rms_mm", rms)
+            .error("p99_mm", p99)
+            .error("most_mm", most)
+            .error("penetration_mm", self.penetration * 1e3)
     }
     /// Mean share of the vertices that slept.
     pub fn mean_asleep(&self) -> f64 {
@@ -199,4 +185,37 @@ impl RestReport {
         let [p99, most] = [99, 100].map(|p| percentile(&mut far, p).unwrap_or(0.0));
         [rms, p99, most]
     }
+}
+
+/// Measures an outfit on an exact body and on one with 1.5 mm of noise, in every motion: a row for cloth that never sleeps
+/// and one for cloth that does. `arms` as in [`RestingSubject::new`]; `done` receives the rows.
+///
+/// # Errors
+/// As [`RestingSubject::new`] and [`RestingSubject::run`].
+pub fn measure_rest(
+    outfit: &OutfitSpec,
+    arms: Option<f64>,
+    steps: usize,
+    mut done: impl FnMut(Row),
+) -> Result<(), EvaluateError> {
+    use Motion::{Lifting, Standing, WalkingOff, Waving};
+    let mut subject = RestingSubject::new(outfit, arms)?;
+    let bodies = [
+        ("exact", outfit.config.clone(), 0.0),
+        ("tracked", Config::tracked(), 1.5e-3),
+    ];
+    for (body, config, noise) in bodies {
+        let never = Config {
+            sleep: false,
+            ..config.clone()
+        };
+        for motion in [Standing, Waving, Lifting, WalkingOff] {
+            let scene = format!("{body} {motion:?}");
+            let truth = subject.run(&never, motion, steps, noise)?;
+            done(truth.row(&scene, "never asleep", &truth));
+            let asleep = subject.run(&config, motion, steps, noise)?;
+            done(asleep.row(&scene, "by region", &truth));
+        }
+    }
+    Ok(())
 }

@@ -1,14 +1,15 @@
 //! Results of a benchmark: one row for each method, parameters and scene.
 
-use serde::Serialize;
+use super::EvaluateError;
 use serde_json::{Map, Value, json};
+use std::path::{Path, PathBuf};
 
 /// One measurement.
-#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Row {
     /// Sequence or scene measured on.
     pub scene: String,
-    /// Method measured; rows of one method in one scene are joined in the plot.
+    /// Method measured.
     pub method: String,
     /// Settings, in the order in which they are shown.
     pub parameters: Vec<(String, String)>,
@@ -49,7 +50,7 @@ impl Row {
 /// Results of one benchmark.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Table {
-    /// File name without extension, and title.
+    /// File name without extension.
     pub name: String,
     /// Command that reproduces it.
     pub command: String,
@@ -60,89 +61,51 @@ pub struct Table {
 }
 
 /// Names of the pairs of all rows, each once, in the order of their first use.
-fn names<'a>(pairs: impl Iterator<Item = &'a str>) -> Vec<&'a str> {
+fn names<'a, T: 'a>(pairs: impl Iterator<Item = &'a (String, T)>) -> Vec<&'a str> {
     let mut out: Vec<&str> = Vec::new();
-    for name in pairs {
-        if !out.contains(&name) {
+    for (name, _) in pairs {
+        if !out.contains(&name.as_str()) {
             out.push(name);
         }
     }
     out
 }
 
-/// A field of a CSV file (RFC 4180).
-fn field(text: &str) -> String {
-    if text.contains([',', '"', '\n', '\r']) {
-        format!("\"{}\"", text.replace('"', "\"\""))
-    } else {
-        text.to_owned()
+/// Command line of this process.
+pub(super) fn command_line() -> String {
+    std::env::args().collect::<Vec<_>>().join(" ")
+}
+
+/// Writes `NAME.md` and `NAME.json` into `dir`, which is made when missing. Returns the files.
+///
+/// # Errors
+/// Names the file that cannot be written.
+pub(super) fn write_report(
+    dir: &Path,
+    name: &str,
+    markdown: String,
+    json: &Value,
+) -> Result<[PathBuf; 2], EvaluateError> {
+    let fault = |path: &Path, e: std::io::Error| EvaluateError::new(path.display(), e);
+    std::fs::create_dir_all(dir).map_err(|e| fault(dir, e))?;
+    let files = ["md", "json"].map(|ending| dir.join(format!("{name}.{ending}")));
+    for (path, text) in files.iter().zip([markdown, format!("{json:#}\n")]) {
+        std::fs::write(path, text).map_err(|e| fault(path, e))?;
     }
+    Ok(files)
 }
 
 impl Table {
-    /// An empty table.
-    pub fn new(
-        name: impl Into<String>,
-        command: impl Into<String>,
-        run_time: impl Into<String>,
-    ) -> Self {
+    /// An empty table of this process.
+    pub fn new(name: &str, run_time: &str) -> Self {
         Self {
-            name: name.into(),
-            command: command.into(),
-            run_time: run_time.into(),
+            name: name.to_owned(),
+            command: command_line(),
+            run_time: run_time.to_owned(),
             rows: Vec::new(),
         }
     }
-    /// Names of all errors, in the order of their first use.
-    pub fn errors(&self) -> Vec<&str> {
-        names(
-            self.rows
-                .iter()
-                .flat_map(|r| r.errors.iter().map(|(n, _)| n.as_str())),
-        )
-    }
-    fn parameters(&self) -> Vec<&str> {
-        names(
-            self.rows
-                .iter()
-                .flat_map(|r| r.parameters.iter().map(|(n, _)| n.as_str())),
-        )
-    }
-    /// Comma-separated values: scene, method, parameters, `run_ms`, errors; missing values are empty.
-    pub fn to_csv(&self) -> String {
-        let (parameters, errors) = (self.parameters(), self.errors());
-        let mut out = String::from("scene,method");
-        for p in parameters
-            .iter()
-            .copied()
-            .chain(["run_ms"])
-            .chain(errors.iter().copied())
-        {
-            out.push(',');
-            out += &field(p);
-        }
-        out.push('\n');
-        for row in &self.rows {
-            out += &field(&row.scene);
-            out.push(',');
-            out += &field(&row.method);
-            for p in &parameters {
-                out.push(',');
-                out += &row
-                    .parameters
-                    .iter()
-                    .find(|(n, _)| n == p)
-                    .map_or(String::new(), |(_, v)| field(v));
-            }
-            out += &format!(",{:.4}", row.run_ms);
-            for e in &errors {
-                out.push(',');
-                out += &row.get(e).map_or(String::new(), |v| format!("{v:.4}"));
-            }
-            out.push('\n');
-        }
-        out
-    }
+
     /// Table as JSON; numbers that are not finite become null.
     pub fn to_json(&self) -> Value {
         let row = |r: &Row| {
@@ -163,30 +126,38 @@ impl Table {
             "rows": self.rows.iter().map(row).collect::<Vec<_>>(),
         })
     }
-    /// Rows as aligned text for a terminal or a Markdown page.
+
+    /// Rows as a table of Markdown.
     pub fn to_markdown(&self) -> String {
-        let (parameters, errors) = (self.parameters(), self.errors());
+        let parameters = names(self.rows.iter().flat_map(|r| &r.parameters));
+        let errors = names(self.rows.iter().flat_map(|r| &r.errors));
         let mut head = vec!["scene", "method"];
         head.extend(parameters.iter().chain(&["run_ms"]).chain(&errors));
         let mut out = format!("| {} |\n|{}\n", head.join(" | "), "---|".repeat(head.len()));
         for r in &self.rows {
             let mut cells = vec![r.scene.clone(), r.method.clone()];
-            let value = |p: &&str| {
-                r.parameters
-                    .iter()
-                    .find(|(n, _)| n == p)
-                    .map_or(String::new(), |(_, v)| v.clone())
-            };
-            cells.extend(parameters.iter().map(value));
-            cells.push(format!("{:.2}", r.run_ms));
+            let value = |p: &&str| r.parameters.iter().find(|(n, _)| n == p);
+            let number = |v: f64| format!("{v:.2}");
+            cells.extend(
+                (parameters.iter()).map(|p| value(p).map_or(String::new(), |(_, v)| v.clone())),
+            );
+            cells.push(number(r.run_ms));
             cells.extend(
                 errors
                     .iter()
-                    .map(|e| r.get(e).map_or(String::new(), |v| format!("{v:.2}"))),
+                    .map(|e| r.get(e).map_or(String::new(), number)),
             );
             out += &format!("| {} |\n", cells.join(" | "));
         }
         out
+    }
+
+    /// Writes `NAME.md` and `NAME.json` into `dir`, which is made when missing. Returns the files.
+    ///
+    /// # Errors
+    /// Names the file that cannot be written.
+    pub fn write(&self, dir: &Path) -> Result<[PathBuf; 2], EvaluateError> {
+        write_report(dir, &self.name, self.to_markdown(), &self.to_json())
     }
 }
 
@@ -194,48 +165,23 @@ impl Table {
 mod tests {
     use super::*;
 
-    fn table() -> Table {
-        let mut t = Table::new("trial", "tryon-bench trial", "one step");
-        t.rows.push(
-            Row::new("walk, fast", "plane", 1.5)
-                .with("iterations", 2)
-                .error("joints_mm", 9.0),
-        );
-        t.rows.push(
-            Row::new("walk, fast", "plane", 3.0)
-                .with("iterations", 8)
-                .error("joints_mm", 5.0),
-        );
-        t.rows.push(
-            Row::new("walk, fast", "said \"point\"", 4.0)
-                .error("joints_mm", f64::NAN)
-                .error("lost", 2.0),
-        );
-        t
-    }
-
     #[test]
-    fn csv_quotes_and_leaves_gaps() {
-        let csv = table().to_csv();
-        let lines: Vec<&str> = csv.lines().collect();
-        assert_eq!(lines[0], "scene,method,iterations,run_ms,joints_mm,lost");
-        assert_eq!(lines[1], "\"walk, fast\",plane,2,1.5000,9.0000,");
-        assert_eq!(
-            lines[3],
-            "\"walk, fast\",\"said \"\"point\"\"\",,4.0000,NaN,2.0000"
-        );
-    }
-
-    #[test]
-    fn json_keeps_every_row_and_markdown_every_column() {
-        let v = table().to_json();
-        assert_eq!(v["rows"][1]["errors"]["joints_mm"], 5.0);
-        assert!(v["rows"][2]["errors"]["joints_mm"].is_null());
-        assert!(
-            table()
-                .to_markdown()
-                .lines()
-                .all(|l| l.matches('|').count() == 7)
-        );
+    fn files_hold_every_row_and_column_and_a_bad_folder_is_named() {
+        let mut table = Table::new("trial", "one step");
+        let row = |ms| Row::new("walk", "plane", ms);
+        table.rows = vec![
+            row(1.5).with("iterations", 2).error("joints_mm", 9.0),
+            row(3.0).error("joints_mm", f64::NAN).error("lost", 2.0),
+        ];
+        let dir = tempfile::tempdir().expect("folder");
+        let [markdown, json] = table.write(&dir.path().join("new")).expect("written");
+        let text = std::fs::read_to_string(&markdown).expect("text");
+        assert!(text.lines().all(|l| l.matches('|').count() == 7), "{text}");
+        let text = std::fs::read_to_string(json).expect("text");
+        let value: Value = serde_json::from_str(&text).expect("JSON");
+        assert_eq!(value["rows"][0]["errors"]["joints_mm"], 9.0);
+        assert!(value["rows"][1]["errors"]["joints_mm"].is_null());
+        let error = table.write(&markdown).expect_err("a file is no folder");
+        assert!(error.to_string().contains("trial.md"), "{error}");
     }
 }

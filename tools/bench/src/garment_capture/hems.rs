@@ -1,29 +1,32 @@
 //! Hems: distance of the seen boundaries of true garments from the rings of found ones.
 
+use super::settings::CaptureBenchSettings;
 use crate::scans::TrueGarment;
 use tryon_clothcap::multi::Ring;
 use tryon_geometry::math::P3;
 use tryon_geometry::mesh::boundary_edges;
 use tryon_geometry::spatial::HashGrid;
 
-/// Radius around a hem in which scan points tell whether it is seen, metres.
-const AROUND: f32 = 0.015;
-/// Least share of the garment's own points there. Hems under other garments show where cloth pokes through.
-const LEAST_OWN: f64 = 0.25;
-
 /// Seen part of a garment's boundary: ends and middles of its boundary edges, metres. `points` and their labels are those of
 /// the scan, `label` is the garment's.
-pub(super) fn seen_hems(garment: &TrueGarment, points: &[P3], labels: &[u8], label: u8) -> Vec<P3> {
+pub(super) fn seen_hems(
+    settings: &CaptureBenchSettings,
+    garment: &TrueGarment,
+    points: &[P3],
+    labels: &[u8],
+    label: u8,
+) -> Vec<P3> {
+    let around = settings.around;
     let mut grid = HashGrid::default();
     // Searches reach half a cell. Points found twice hardly change the share.
-    grid.fill(points, 2.0 * AROUND);
+    grid.fill(points, 2.0 * around);
     let is_seen = |p: &P3| {
         let (mut own, mut all) = (0, 0);
-        grid.within(p, AROUND, |i, _| {
+        grid.within(p, around, |i, _| {
             own += usize::from(labels[i as usize] == label);
             all += 1;
         });
-        own > 0 && own as f64 >= LEAST_OWN * f64::from(all)
+        own > 0 && own as f64 >= settings.least_own * f64::from(all)
     };
     let ends = |[a, b]: [u32; 2]| {
         let [a, b] = [a, b].map(|v| garment.vertices[v as usize]);
@@ -58,14 +61,11 @@ fn distance_from_segment(p: &P3, [a, b]: &[P3; 2]) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use tryon_garment::GarmentKind;
 
     /// Square of 2 m in the plane z = 0.
     fn square() -> TrueGarment {
         TrueGarment {
             name: "square".into(),
-            kind: GarmentKind::Top,
-            is_rigid: false,
             vertices: [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]]
                 .map(|[x, y]| P3::new(x, y, 0.0))
                 .to_vec(),
@@ -81,7 +81,13 @@ mod tests {
         let mut labels = vec![2; points.len()];
         labels[2] = 1;
         labels[..2].fill(1);
-        let seen = seen_hems(&square(), &points, &labels, 1);
+        let seen = seen_hems(
+            &CaptureBenchSettings::default(),
+            &square(),
+            &points,
+            &labels,
+            1,
+        );
         assert_eq!(seen, [P3::new(1.0, 0.0, 0.0), P3::new(1.0, 1.0, 0.0)]);
     }
 
@@ -96,7 +102,13 @@ mod tests {
             .iter()
             .map(|p| P3::new(p.x, p.y, 0.25))
             .collect();
-        let hems = seen_hems(&square(), &square().vertices, &[1; 4], 1);
+        let hems = seen_hems(
+            &CaptureBenchSettings::default(),
+            &square(),
+            &square().vertices,
+            &[1; 4],
+            1,
+        );
         let found = distance_from_rings(&hems, &[ring], &lifted);
         assert!((found - 0.25).abs() < 1e-6, "{found}");
         assert_eq!(distance_from_rings(&hems, &[], &lifted), 0.0);

@@ -1,18 +1,16 @@
 //! Garment capture against truth: labels, boundaries, surfaces, the body below, other bodies; run time against error.
 
-mod clouds;
 mod hems;
 mod made_scenes;
 mod scenes;
 pub(crate) mod score;
+mod settings;
 mod turn;
-mod variant;
 
-pub use clouds::{CloudCell, film_clouds, measure_cloud};
 pub use made_scenes::{MadeScenes, made_scenes};
 pub use scenes::{CaptureScene, capture_scenes};
-pub use turn::{TurnFilm, TurnScene, measure_turn, measure_turn_scene, turn_scenes};
-pub use variant::CaptureVariant;
+pub use settings::CaptureBenchSettings;
+pub use turn::{TurnScene, measure_turn_scene, turn_scenes};
 
 use super::scans::TrueScan;
 use super::{EvaluateError, Row};
@@ -25,7 +23,8 @@ use tryon_clothcap::align::find_frame;
 use tryon_clothcap::archive::FrameDisplacements;
 use tryon_clothcap::scan::BodyScan;
 use tryon_clothcap::{
-    BodyDresser, CaptureError, CapturedOutfit, FrameCapture, OutfitCapture, population,
+    BodyDresser, CaptureConfig, CaptureError, CapturedOutfit, FrameCapture, OutfitCapture,
+    population,
 };
 use tryon_formats::scan::ScanMesh;
 use tryon_geometry::math::P3;
@@ -33,76 +32,27 @@ use tryon_geometry::math::P3;
 /// Seed of the bodies that garments are retargeted to.
 const BODIES_SEED: u64 = 11;
 
-/// Captures the scans of a scene and compares with their truth: one row.
+/// Captures the scans of a scene and compares with their truth: one row. A capture that fails is a row without errors and
+/// with its reason as parameter.
 ///
 /// # Errors
-/// Scenes that cannot be made. A capture that fails is a row without errors and with its reason as parameter.
-pub fn measure(
-    scene: &CaptureScene,
-    variant: &CaptureVariant,
-    bodies: usize,
-) -> Result<Row, EvaluateError> {
-    let scans = variant.scanned(&scene.scene).scans()?;
-    Ok(measure_scans(&scene.name, &scans, variant, bodies))
+/// Scenes that cannot be made.
+pub fn measure(scene: &CaptureScene, bodies: usize) -> Result<Row, EvaluateError> {
+    Ok(measure_scans(&scene.name, &scene.scene.scans()?, bodies))
 }
 
-/// Measures variants on a scene, in order; `each` receives the rows. Scans of one resolution are made once, and variants
-/// that differ in their names only are run once.
-///
-/// # Errors
-/// As [`measure`].
-pub fn measure_all(
-    scene: &CaptureScene,
-    variants: &[CaptureVariant],
-    bodies: usize,
-    mut each: impl FnMut(Row),
-) -> Result<(), EvaluateError> {
-    let mut made: Option<(Option<usize>, Vec<TrueScan>)> = None;
-    let mut rows: Vec<Row> = Vec::new();
-    for (k, variant) in variants.iter().enumerate() {
-        let same = variants[..k].iter().position(|v| v.is_same_run(variant));
-        let row = match same {
-            Some(at) => labelled(rows[at].clone(), variant),
-            None => {
-                let scans = match made.take().filter(|(points, _)| *points == variant.points) {
-                    Some((_, scans)) => scans,
-                    None => variant.scanned(&scene.scene).scans()?,
-                };
-                let row = measure_scans(&scene.name, &scans, variant, bodies);
-                made = Some((variant.points, scans));
-                row
-            }
-        };
-        each(row.clone());
-        rows.push(row);
-    }
-    Ok(())
-}
-
-fn measure_scans(name: &str, scans: &[TrueScan], variant: &CaptureVariant, bodies: usize) -> Row {
-    let template = embedded::template();
-    let row = |ms| labelled(Row::new(name, "", ms).with("scans", scans.len()), variant);
-    match run(&template, scans, variant, bodies) {
-        // The first scan's search of the person hides what a sweep changes.
-        Ok(run) if variant.value.is_some() => run.row(row(run.later_ms)),
+fn measure_scans(name: &str, scans: &[TrueScan], bodies: usize) -> Row {
+    let row = |ms| Row::new(name, "whole", ms).with("scans", scans.len());
+    match run(&embedded::template(), scans, bodies) {
         Ok(run) => run.row(row(run.first_ms)),
         Err(e) => row(0.0).with("fault", e),
-    }
-}
-
-/// A row under the name of a variant.
-fn labelled(mut row: Row, variant: &CaptureVariant) -> Row {
-    row.method = variant.name.into();
-    row.parameters.retain(|(name, _)| name != "value");
-    match variant.value {
-        Some(value) => row.with("value", value),
-        None => row,
     }
 }
 
 /// Means over the scans of a scene.
 #[derive(Debug, Default)]
 struct SceneRun {
+    settings: CaptureBenchSettings,
     labels: LabelScore,
     surface: f64,
     /// Seen vertices.
@@ -110,9 +60,6 @@ struct SceneRun {
     /// Vertices below another garment, completed from the body.
     hidden: Mean,
     hem: Mean,
-    /// The same of the parts' vertices on the single mesh.
-    single: Mean,
-    single_hem: Mean,
     body: f64,
     own: f64,
     inside: usize,
@@ -146,9 +93,7 @@ impl SceneRun {
             .error("surface_mm", 1e3 * self.surface)
             .error("garment_mm", 1e3 * self.garment.value())
             .error("hidden_mm", 1e3 * self.hidden.value())
-            .error("single_garment_mm", 1e3 * self.single.value())
             .error("hem_mm", 1e3 * self.hem.value())
-            .error("single_hem_mm", 1e3 * self.single_hem.value())
             .error("body_mm", 1e3 * self.body)
             .error("own_body_max_mm", 1e3 * self.own)
             .error("inside", self.inside as f64)
@@ -160,11 +105,9 @@ impl SceneRun {
 fn run(
     template: &Arc<Template>,
     scans: &[TrueScan],
-    variant: &CaptureVariant,
     bodies: usize,
 ) -> Result<SceneRun, CaptureError> {
-    let garments = scans.first().map_or(&[][..], |s| &s.garments);
-    let mut capture = OutfitCapture::new(template.clone(), variant.config(garments))?;
+    let mut capture = OutfitCapture::new(template.clone(), CaptureConfig::default())?;
     let mut out = SceneRun::default();
     let share = 1.0 / scans.len().max(1) as f64;
     let mut first = None;
@@ -210,10 +153,9 @@ fn run(
 fn mesh_of(scan: &TrueScan) -> ScanMesh {
     ScanMesh {
         points: scan.points.clone(),
-        faces: scan.faces.clone(),
         normals: scan.normals.clone(),
         colors: scan.colors.clone(),
-        texture: Vec::new(),
+        ..ScanMesh::default()
     }
 }
 
@@ -226,7 +168,7 @@ impl SceneRun {
         share: f64,
     ) -> LabelScore {
         let rows = scan.rows(&captured.labels, 0);
-        let labels = score_labels(&truth.points, &truth.labels, &rows);
+        let labels = score_labels(&self.settings, &truth.points, &truth.labels, &rows);
         self.labels.f1 += share * labels.f1;
         self.labels.boundary += share * labels.boundary;
         self.surface += share * captured.report.alignment.surface_error;
@@ -235,7 +177,7 @@ impl SceneRun {
         labels
     }
 
-    /// Garments of one scan beside the true ones: as parts, and cut out of the single mesh along the same rings.
+    /// Garments of one scan beside the true ones.
     fn add_garments(
         &mut self,
         outfit: &CapturedOutfit,
@@ -249,10 +191,8 @@ impl SceneRun {
                 continue;
             };
             let real = &truth.garments[usize::from(label) - 1];
-            let hems = seen_hems(real, &truth.points, &truth.labels, label);
-            let surface = &captured.alignment.surface;
-            let single: Vec<P3> = part.nodes.iter().map(|v| surface[*v as usize]).collect();
-            let hem = |v: &[P3]| distance_from_rings(&hems, &part.rings, v);
+            let hems = seen_hems(&self.settings, real, &truth.points, &truth.labels, label);
+            let hem = distance_from_rings(&hems, &part.rings, vertices);
             let add = |mean: &mut Mean, all: &[P3], hidden: bool| {
                 let some = all.iter().zip(&part.hidden);
                 let some = some.filter(|(_, h)| **h == hidden).map(|(p, _)| *p);
@@ -264,9 +204,7 @@ impl SceneRun {
             };
             add(&mut self.garment, vertices, false);
             add(&mut self.hidden, vertices, true);
-            add(&mut self.single, &single, false);
-            self.hem.add(hem(vertices), hems.len());
-            self.single_hem.add(hem(&single), hems.len());
+            self.hem.add(hem, hems.len());
         }
     }
 

@@ -1,17 +1,11 @@
 //! Scores of a capture: F1 and boundaries of labels, distances between surfaces.
 
+use super::settings::CaptureBenchSettings;
 use crate::scans::{SKIN_LABEL, STRAY_LABEL};
 use std::collections::BTreeMap;
 use tryon_geometry::math::P3;
 use tryon_geometry::mesh::Face;
 use tryon_geometry::spatial::{Bvh, HashGrid, PointTree};
-
-/// Least share of a scan's points that a garment needs to be judged; less is a rim under another one.
-const LEAST_SHARE: f64 = 0.005;
-/// Distance within which points are neighbours, metres.
-const NEIGHBOURS: f32 = 0.008;
-/// Farthest boundary that is searched, metres.
-const FARTHEST: f32 = 0.5;
 
 /// Score of the labels of one scan.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -32,69 +26,65 @@ impl LabelScore {
 }
 
 /// Compares found parts (0 is skin) with true labels; parts are matched by their overlap.
-pub(super) fn score_labels(points: &[P3], truth: &[u8], found: &[u8]) -> LabelScore {
-    let judged = |t: &u8| *t != STRAY_LABEL;
+pub(super) fn score_labels(
+    settings: &CaptureBenchSettings,
+    points: &[P3],
+    truth: &[u8],
+    found: &[u8],
+) -> LabelScore {
     let mut overlap: BTreeMap<(u8, u8), usize> = BTreeMap::new();
-    for (t, f) in truth.iter().zip(found).filter(|(t, _)| judged(t)) {
+    for (t, f) in truth.iter().zip(found).filter(|(t, _)| **t != STRAY_LABEL) {
         *overlap.entry((*t, *f)).or_default() += 1;
     }
-    let total = truth.iter().filter(|t| judged(t)).count() as f64;
-    let count = |t: u8| truth.iter().filter(|x| **x == t).count();
-    let mut garments: Vec<u8> = overlap
-        .keys()
-        .map(|k| k.0)
-        .filter(|t| *t != SKIN_LABEL)
-        .collect();
+    let sum = |wanted: &dyn Fn(&(u8, u8)) -> bool| -> usize {
+        let some = overlap.iter().filter(|(pair, _)| wanted(pair));
+        some.map(|(_, n)| n).sum()
+    };
+    let least = settings.least_share * sum(&|_| true) as f64;
+    let mut garments: Vec<u8> = overlap.keys().map(|(t, _)| *t).collect();
     garments.dedup();
-    garments.retain(|t| count(*t) as f64 > LEAST_SHARE * total);
+    garments.retain(|t| *t != SKIN_LABEL && sum(&|(u, _)| u == t) as f64 > least);
 
-    let mut pairs: Vec<((u8, u8), usize)> = overlap
-        .iter()
-        .filter(|((t, f), _)| garments.contains(t) && *f != 0)
-        .map(|(k, n)| (*k, *n))
-        .collect();
+    let pairs = overlap.iter();
+    let pairs = pairs.filter(|((t, f), _)| garments.contains(t) && *f != 0);
+    let mut pairs: Vec<_> = pairs.collect();
     pairs.sort_by_key(|p| std::cmp::Reverse(p.1));
     let mut matches = BTreeMap::new();
-    for ((t, f), _) in &pairs {
+    for ((t, f), _) in pairs {
         if !matches.contains_key(f) && !matches.values().any(|x| x == t) {
             matches.insert(*f, *t);
         }
     }
     let f1 = |t: &u8| {
         let part = matches.iter().find(|(_, x)| *x == t).map(|(f, _)| *f);
-        let hits = part
-            .and_then(|f| overlap.get(&(*t, f)))
-            .copied()
-            .unwrap_or(0) as f64;
-        let all = part.map_or(0, |f| {
-            truth
-                .iter()
-                .zip(found)
-                .filter(|(t, g)| judged(t) && **g == f)
-                .count()
-        });
-        2.0 * hits / (count(*t) + all).max(1) as f64
+        let hits = part.map_or(0, |f| overlap.get(&(*t, f)).copied().unwrap_or(0));
+        let all = part.map_or(0, |f| sum(&|(_, g)| *g == f));
+        2.0 * hits as f64 / (sum(&|(u, _)| u == t) + all).max(1) as f64
     };
-    let relabelled: Vec<u8> = found
-        .iter()
-        .map(|f| matches.get(f).copied().unwrap_or(*f))
-        .collect();
+    let relabelled = found.iter().map(|f| *matches.get(f).unwrap_or(f));
+    let relabelled: Vec<u8> = relabelled.collect();
     LabelScore {
         f1: garments.iter().map(f1).sum::<f64>() / garments.len().max(1) as f64,
-        boundary: boundary_distance(points, truth, &relabelled),
+        boundary: boundary_distance(settings, points, truth, &relabelled),
         matches,
     }
 }
 
 /// Mean distance of the found boundary from the true one, metres.
-fn boundary_distance(points: &[P3], truth: &[u8], found: &[u8]) -> f64 {
+fn boundary_distance(
+    settings: &CaptureBenchSettings,
+    points: &[P3],
+    truth: &[u8],
+    found: &[u8],
+) -> f64 {
+    let (radius, farthest) = (settings.neighbours, settings.farthest);
     let mut grid = HashGrid::default();
     // Searches reach half a cell.
-    grid.fill(points, 2.0 * NEIGHBOURS);
+    grid.fill(points, 2.0 * radius);
     let boundary = |labels: &[u8]| -> Vec<P3> {
         let differs = |i: &usize| {
             let mut any = false;
-            grid.within(&points[*i], NEIGHBOURS, |j, _| {
+            grid.within(&points[*i], radius, |j, _| {
                 let j = j as usize;
                 any |= labels[j] != labels[*i] && truth[j] != STRAY_LABEL;
             });
@@ -107,7 +97,7 @@ fn boundary_distance(points: &[P3], truth: &[u8], found: &[u8]) -> f64 {
     };
     let (real, ours) = (boundary(truth), boundary(found));
     let tree = PointTree::new(&real);
-    let distance = |p: &P3| tree.nearest(p, FARTHEST).map_or(FARTHEST, |n| n.1.sqrt());
+    let distance = |p: &P3| tree.nearest(p, farthest).map_or(farthest, |n| n.1.sqrt());
     ours.iter().map(|p| f64::from(distance(p))).sum::<f64>() / ours.len().max(1) as f64
 }
 
@@ -138,19 +128,20 @@ mod tests {
             .collect()
     }
 
+    fn score(points: &[P3], truth: &[u8], found: &[u8]) -> LabelScore {
+        score_labels(&CaptureBenchSettings::default(), points, truth, found)
+    }
+
     #[test]
     fn a_shifted_boundary_is_as_far_as_it_is() {
         let points = line(400);
         let truth: Vec<u8> = (0..400).map(|i| if i < 200 { 1 } else { 2 }).collect();
-        let exact = score_labels(
-            &points,
-            &truth,
-            &truth.iter().map(|t| 3 - t).collect::<Vec<_>>(),
-        );
+        let swapped: Vec<u8> = truth.iter().map(|t| 3 - t).collect();
+        let exact = score(&points, &truth, &swapped);
         assert_eq!((exact.f1, exact.boundary), (1.0, 0.0));
         assert_eq!((exact.true_label(2), exact.true_label(3)), (Some(1), None));
         let found: Vec<u8> = (0..400).map(|i| if i < 220 { 1 } else { 2 }).collect();
-        let score = score_labels(&points, &truth, &found);
+        let score = score(&points, &truth, &found);
         assert!((score.boundary - 0.036).abs() < 0.006, "{score:?}");
         assert!((score.f1 - 0.95).abs() < 0.01, "{score:?}");
     }
@@ -160,7 +151,7 @@ mod tests {
         let points = line(300);
         let truth: Vec<u8> = (0..300).map(|i| [1, 2, STRAY_LABEL][i / 100]).collect();
         let found: Vec<u8> = (0..300).map(|i| [1, 0, 1][i / 100]).collect();
-        let score = score_labels(&points, &truth, &found);
+        let score = score(&points, &truth, &found);
         assert!((score.f1 - 0.5).abs() < 1e-9, "{score:?}");
     }
 }

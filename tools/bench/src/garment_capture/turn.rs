@@ -2,10 +2,8 @@
 
 use super::scenes::{library_outfit, shaped_actor};
 use super::score::{mean_distance, score_labels};
-use crate::scans::{
-    DepthCamera, FilmedFrame, ScanDefects, ScanMotion, ScanPalette, ScanScene, ScannerSetting,
-    TrueScan,
-};
+use super::settings::CaptureBenchSettings;
+use crate::scans::{DepthCamera, FilmedFrame, ScanMotion, ScanScene, ScannerSetting, TrueScan};
 use crate::{EvaluateError, Row};
 use std::f64::consts::TAU;
 use std::time::Instant;
@@ -16,21 +14,6 @@ use tryon_geometry::math::{P3, Rigid, World};
 use tryon_geometry::mesh::Face;
 use tryon_geometry::spatial::PointTree;
 use tryon_synth::Routine;
-
-/// Frames of a film and their rate, Hz.
-const FRAMES: usize = 96;
-/// See [`FRAMES`].
-const RATE: f64 = 10.0;
-/// Frames before the turn begins: the tracker measures the size.
-const STANDING: usize = 12;
-/// Turn about the vertical from the first to the last frame, radians.
-const TURN: f64 = 1.05 * TAU;
-/// Points of the true scan that labels are judged at.
-const POINTS: usize = 20_000;
-/// Frames with true scan points lie within this angle of facing the camera, radians.
-const FRONTAL: f64 = 0.2;
-/// Farthest fused point that labels a true one, metres.
-const REACH: f32 = 0.03;
 
 /// Named turn.
 #[derive(Clone, Debug)]
@@ -59,43 +42,14 @@ const RAISED: (Routine, f64) = (Routine::Still, 0.0);
 const HANGING: (Routine, f64) = (Routine::Turn, 1.8);
 
 /// Outfits on bodies of several shapes; every third is unseen.
+#[rustfmt::skip]
 const SCENES: [TurnSpec; 6] = [
-    (
-        "turn: tshirt and trousers",
-        &[("trousers", 0), ("tshirt", 1)],
-        &[0.0],
-        RAISED,
-    ),
-    (
-        "turn: long sleeves tucked",
-        &[("longsleeve", 0), ("trousers", 1)],
-        &[1.0, -0.5, 1.0],
-        HANGING,
-    ),
-    (
-        "turn: hooded top and shorts",
-        &[("shorts", 0), ("hoodie", 1)],
-        &[1.2, -1.0, 0.0],
-        RAISED,
-    ),
-    (
-        "turn: heavy",
-        &[("trousers", 0), ("tshirt", 1)],
-        &[0.0, 2.0, 0.5],
-        HANGING,
-    ),
-    (
-        "turn: sleeves over trousers",
-        &[("trousers", 0), ("longsleeve", 1)],
-        &[0.0, 0.5, 1.0],
-        RAISED,
-    ),
-    (
-        "turn: vest over sleeves",
-        &[("longsleeve", 0), ("trousers", 1), ("tank", 2)],
-        &[0.5, 0.0, 1.0],
-        HANGING,
-    ),
+    ("turn: tshirt and trousers", &[("trousers", 0), ("tshirt", 1)], &[0.0], RAISED),
+    ("turn: long sleeves tucked", &[("longsleeve", 0), ("trousers", 1)], &[1.0, -0.5, 1.0], HANGING),
+    ("turn: hooded top and shorts", &[("shorts", 0), ("hoodie", 1)], &[1.2, -1.0, 0.0], RAISED),
+    ("turn: heavy", &[("trousers", 0), ("tshirt", 1)], &[0.0, 2.0, 0.5], HANGING),
+    ("turn: sleeves over trousers", &[("trousers", 0), ("longsleeve", 1)], &[0.0, 0.5, 1.0], RAISED),
+    ("turn: vest over sleeves", &[("longsleeve", 0), ("trousers", 1), ("tank", 2)], &[0.5, 0.0, 1.0], HANGING),
 ];
 
 /// Scenes of the bench.
@@ -103,6 +57,7 @@ const SCENES: [TurnSpec; 6] = [
 /// # Errors
 /// A garment that the library lacks.
 pub fn turn_scenes() -> Result<Vec<TurnScene>, EvaluateError> {
+    let settings = CaptureBenchSettings::default();
     let scene = |(k, spec): (usize, &TurnSpec)| -> Result<TurnScene, EvaluateError> {
         let (name, outfit, shape, (routine, start)) = spec;
         Ok(TurnScene {
@@ -110,23 +65,22 @@ pub fn turn_scenes() -> Result<Vec<TurnScene>, EvaluateError> {
             scene: ScanScene {
                 actor: shaped_actor(shape, k),
                 garments: library_outfit(outfit)?,
-                skinned: Vec::new(),
                 motion: ScanMotion::Turn {
                     routine: *routine,
                     start: *start,
-                    delay: STANDING as f64 / RATE,
-                    speed: TURN * RATE / (FRAMES - STANDING) as f64,
+                    delay: settings.standing as f64 / settings.film_rate,
+                    speed: settings.turns * TAU * settings.film_rate
+                        / (settings.frames - settings.standing) as f64,
                 },
-                palette: ScanPalette::Distinct,
                 scanner: ScannerSetting {
-                    points: POINTS,
+                    points: settings.film_points,
                     ..ScannerSetting::default()
                 },
-                defects: ScanDefects::default(),
-                scans: FRAMES,
-                rate: RATE,
-                edge: 0.021,
+                scans: settings.frames,
+                rate: settings.film_rate,
+                edge: settings.edge,
                 seed: 200 + k as u64,
+                ..ScanScene::default()
             },
             camera: DepthCamera::default(),
             is_unseen: k % 3 == 2,
@@ -136,27 +90,21 @@ pub fn turn_scenes() -> Result<Vec<TurnScene>, EvaluateError> {
 }
 
 /// Frames of a scene.
-#[derive(Clone, Debug)]
-pub struct TurnFilm {
-    /// Name of the scene.
-    pub name: String,
-    /// Camera.
-    pub camera: DepthCamera,
-    /// Frames with their truth.
-    pub frames: Vec<FilmedFrame>,
+struct TurnFilm {
+    name: String,
+    camera: DepthCamera,
+    frames: Vec<FilmedFrame>,
 }
 
 impl TurnFilm {
     /// Films a scene.
-    ///
-    /// # Errors
-    /// Scenes that cannot be made.
-    pub fn shoot(scene: &TurnScene) -> Result<Self, EvaluateError> {
+    fn shoot(scene: &TurnScene) -> Result<Self, EvaluateError> {
         let mut frames = Vec::new();
-        let step = TURN / (FRAMES - STANDING) as f64;
+        let settings = CaptureBenchSettings::default();
+        let step = settings.step();
         let is_frontal = |k: usize| {
-            let yaw = (k.saturating_sub(STANDING) as f64 * step).rem_euclid(TAU);
-            yaw.min(TAU - yaw) < FRONTAL
+            let yaw = (k.saturating_sub(settings.standing) as f64 * step).rem_euclid(TAU);
+            yaw.min(TAU - yaw) < settings.frontal
         };
         scene.scene.film(&scene.camera, is_frontal, |frame| {
             frames.push(frame);
@@ -168,6 +116,15 @@ impl TurnFilm {
             frames,
         })
     }
+
+    /// Tracks the subject.
+    fn track(&self) -> Result<KeyFrames, TurnError> {
+        let mut tracker = TurnTracker::new(embedded::template(), self.camera.calibration());
+        for frame in &self.frames {
+            tracker.step(&frame.frame)?;
+        }
+        tracker.finish()
+    }
 }
 
 /// Films, tracks and captures a scene from the tracked poses and from the registered ones: a row each.
@@ -176,10 +133,9 @@ impl TurnFilm {
 /// Scenes that cannot be made, or in which nobody is tracked.
 pub fn measure_turn_scene(scene: &TurnScene) -> Result<Vec<Row>, EvaluateError> {
     let film = TurnFilm::shoot(scene)?;
-    let keys = film.track().map_err(|e| EvaluateError::Scene {
-        scene: scene.name.clone(),
-        why: e.to_string(),
-    })?;
+    let keys = film
+        .track()
+        .map_err(|e| EvaluateError::new(&scene.name, e))?;
     let whole = TurnConfig::default();
     let tracked = TurnConfig {
         iterations: 0,
@@ -192,23 +148,9 @@ pub fn measure_turn_scene(scene: &TurnScene) -> Result<Vec<Row>, EvaluateError> 
         .collect())
 }
 
-impl TurnFilm {
-    /// Tracks the subject.
-    ///
-    /// # Errors
-    /// [`TurnError::Nobody`].
-    pub fn track(&self) -> Result<KeyFrames, TurnError> {
-        let mut tracker = TurnTracker::new(embedded::template(), self.camera.calibration());
-        for frame in &self.frames {
-            tracker.step(&frame.frame)?;
-        }
-        tracker.finish()
-    }
-}
-
 /// Captures the garments of a tracked film and compares them with their truth in the reference frame: one row. A capture that fails
 /// is a row with its reason as parameter.
-pub fn measure_turn(
+fn measure_turn(
     film: &TurnFilm,
     keys: &KeyFrames,
     method: &'static str,
@@ -243,8 +185,9 @@ fn score(film: &TurnFilm, fused: &FusedTurn, captured: &FrameCapture, row: Row) 
         out
     };
     let points = moved(&fused.scan.points);
-    let labels = labels_at(truth, &points, &captured.labels);
-    let judged = score_labels(&truth.points, &truth.labels, &labels);
+    let settings = CaptureBenchSettings::default();
+    let labels = labels_at(truth, &points, &captured.labels, settings.reach);
+    let judged = score_labels(&settings, &truth.points, &truth.labels, &labels);
     let (mut sum, mut count) = (0.0, 0.0);
     for (k, vertices) in captured.garments.iter().enumerate() {
         let Some(label) = judged.true_label(k as u8 + 1) else {
@@ -270,9 +213,9 @@ fn score(film: &TurnFilm, fused: &FusedTurn, captured: &FrameCapture, row: Row) 
 }
 
 /// Found label at each true scan point: that of the nearest fused point, skin without one.
-fn labels_at(truth: &TrueScan, points: &[P3], labels: &[u8]) -> Vec<u8> {
+fn labels_at(truth: &TrueScan, points: &[P3], labels: &[u8], reach: f32) -> Vec<u8> {
     let tree = PointTree::new(points);
-    let at = |p: &P3| tree.nearest(p, REACH).map_or(0, |(i, _)| labels[i]);
+    let at = |p: &P3| tree.nearest(p, reach).map_or(0, |(i, _)| labels[i]);
     truth.points.iter().map(at).collect()
 }
 

@@ -6,7 +6,7 @@
 
 use super::field::Field;
 use super::figure::{Figure, Joints};
-use super::{carve, rig, statistics as stat};
+use super::{BodySettings, carve, rig, statistics as stat};
 use tryon_body::embedded::DIRECTIONS;
 use tryon_body::measure::{Measurements, measure};
 use tryon_body::parts::BodySegment;
@@ -14,20 +14,6 @@ use tryon_body::{BodyError, BodyShape, ShapeSpace, Skeleton, SkinWeights, Templa
 use tryon_geometry::math::{P3d, V3d};
 use tryon_geometry::mesh::smoothing::smoothed;
 use tryon_geometry::par::{self, Par};
-
-/// Projection steps onto the changed surface; from the third on, no vertex moves by 0.1 mm.
-const STEPS: usize = 4;
-/// Passes of smoothing of the offsets along the surface.
-const SMOOTHING: usize = 8;
-/// Sections grow with stature by this share of the growth in length: at the same mass-for-height, r(stature, girths)
-/// is about 0.3, and the deviation of girths is some 1.5 times that of stature, relative to the mean.
-const SECTION_GROWTH: f64 = 0.45;
-/// The head grows with stature by this share (head length has r ≈ 0.3 with stature).
-const HEAD_GROWTH: f64 = 0.35;
-
-/// Relative growth of the limbs' and of the trunk's bones in directions that are then scaled to their targets.
-const LIMB_PROBE: f64 = 0.028;
-const TORSO_PROBE: f64 = 0.04;
 
 /// Offsets of vertices and joints for one unit.
 #[derive(Clone)]
@@ -42,6 +28,7 @@ pub(super) struct ShapeSource<'a> {
     pub points: &'a [P3d],
     /// Image of each point on the other side.
     pub mirror: &'a [u32],
+    pub settings: &'a BodySettings,
 }
 
 impl ShapeSource<'_> {
@@ -81,10 +68,10 @@ impl ShapeSource<'_> {
         }
         out
     }
-    /// Offsets after [`SMOOTHING`] passes, still symmetric.
+    /// Smoothed offsets, still symmetric.
     fn smoothed(&self, mut offsets: Vec<V3d>) -> Vec<V3d> {
         let neighbours = self.template.topology().vertex_neighbours();
-        for _ in 0..SMOOTHING {
+        for _ in 0..self.settings.shape_smoothing {
             let next = smoothed(Par::Rayon, neighbours, &offsets);
             // A right vertex copies its image, for symmetry to the bit.
             offsets = self.mirrored(|i| next[i]);
@@ -107,7 +94,10 @@ impl ShapeSource<'_> {
             let p = self.points[i];
             let carried =
                 p + self.blend(i, |k| joints[k] - old[k] + (p - old[k]) * (size(k) - 1.0));
-            field.project(&P3d::new(carried.x.max(0.0), carried.y, carried.z), STEPS) - p
+            field.project(
+                &P3d::new(carried.x.max(0.0), carried.y, carried.z),
+                self.settings.shape_steps,
+            ) - p
         });
         (offsets, joints)
     }
@@ -190,27 +180,28 @@ fn scaled(direction: Direction, s: f64) -> Direction {
 type Target = (fn(&Measurements) -> f64, f64);
 
 /// Growth of a segment's sections with stature, relative to the growth in length.
-fn section_growth(segment: BodySegment) -> f64 {
+fn section_growth(settings: &BodySettings, segment: BodySegment) -> f64 {
     match segment {
-        BodySegment::Head => HEAD_GROWTH,
+        BodySegment::Head => settings.head_growth,
         // Hands and feet keep their proportions.
         BodySegment::Hand | BodySegment::Foot => 1.0,
-        _ => SECTION_GROWTH,
+        _ => settings.section_growth,
     }
 }
 
 /// The directions before they are scaled to their targets, in the order of [`DIRECTIONS`].
 fn raw_directions(source: &ShapeSource) -> [(Direction, Option<Target>); 9] {
     use BodySegment::{Abdomen, Chest, Collar, Foot, Forearm, Hand, Head, Neck, Shin};
+    let settings = source.settings;
     let growth = stat::STATURE.deviation() / stat::STATURE.mean();
-    let along = |s: BodySegment| growth * if s == Head { HEAD_GROWTH } else { 1.0 };
-    let stature = source.by_lengths(along, |s| growth * section_growth(s));
+    let along = |s: BodySegment| growth * if s == Head { settings.head_growth } else { 1.0 };
+    let stature = source.by_lengths(along, |s| growth * section_growth(settings, s));
     let only = |segments: &'static [BodySegment], growth: f64| {
         let length = move |s: BodySegment| if segments.contains(&s) { growth } else { 0.0 };
         source.by_lengths(length, |_| 0.0)
     };
-    let limbs = only(&[Shin, Foot, Forearm, Hand], LIMB_PROBE);
-    let torso = only(&[Abdomen, Chest, Neck, Collar], TORSO_PROBE);
+    let limbs = only(&[Shin, Foot, Forearm, Hand], settings.limb_probe);
+    let torso = only(&[Abdomen, Chest, Neck, Collar], settings.torso_probe);
     let figure = |of: fn(&mut Figure) -> &mut f64| {
         source.by_figure(|c| {
             let mut figure = Figure::default();
@@ -218,13 +209,11 @@ fn raw_directions(source: &ShapeSource) -> [(Direction, Option<Target>); 9] {
             figure
         })
     };
-    let mass_waist = stat::MASS_WAIST * stat::WAIST.deviation();
-    let inseam = stat::CROTCH.residual(stat::STATURE_CROTCH);
-    let torso_length = stat::SITTING.residual(stat::STATURE_SITTING);
-    let shoulders = stat::SHOULDERS.residual(stat::STATURE_SHOULDERS);
-    let chest = stat::CHEST.residual(stat::MASS_CHEST);
-    let waist = stat::WAIST.residual(stat::MASS_WAIST);
-    let hip = stat::HIP.residual(stat::MASS_HIP);
+    let mass_waist = stat::WAIST.correlation * stat::WAIST.deviation();
+    let inseam = stat::CROTCH.residual();
+    let torso_length = stat::SITTING.residual();
+    let shoulders = stat::SHOULDERS.residual();
+    let [chest, waist, hip] = [stat::CHEST, stat::WAIST, stat::HIP].map(|s| s.residual());
     [
         (stature, Some((|m| m.stature, stat::STATURE.deviation()))),
         (figure(|f| &mut f.girth), Some((|m| m.waist, mass_waist))),

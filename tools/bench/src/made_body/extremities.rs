@@ -19,59 +19,22 @@ struct Finger {
 }
 
 /// Index to little finger.
+#[rustfmt::skip]
 const FINGERS: [Finger; 4] = [
-    Finger {
-        root: [0.0285, 0.000, 0.088],
-        segments: [0.042, 0.024, 0.017],
-        radii: [0.0096, 0.0074],
-        spread: 0.16,
-        curl: 0.16,
-    },
-    Finger {
-        root: [0.0085, 0.001, 0.092],
-        segments: [0.046, 0.028, 0.018],
-        radii: [0.0098, 0.0076],
-        spread: 0.03,
-        curl: 0.18,
-    },
-    Finger {
-        root: [-0.0110, 0.000, 0.088],
-        segments: [0.042, 0.026, 0.018],
-        radii: [0.0093, 0.0072],
-        spread: -0.09,
-        curl: 0.20,
-    },
-    Finger {
-        root: [-0.0290, -0.002, 0.080],
-        segments: [0.033, 0.020, 0.016],
-        radii: [0.0083, 0.0065],
-        spread: -0.24,
-        curl: 0.22,
-    },
+    Finger { root: [0.0285, 0.000, 0.088], segments: [0.042, 0.024, 0.017], radii: [0.0096, 0.0074], spread: 0.16, curl: 0.16 },
+    Finger { root: [0.0085, 0.001, 0.092], segments: [0.046, 0.028, 0.018], radii: [0.0098, 0.0076], spread: 0.03, curl: 0.18 },
+    Finger { root: [-0.0110, 0.000, 0.088], segments: [0.042, 0.026, 0.018], radii: [0.0093, 0.0072], spread: -0.09, curl: 0.20 },
+    Finger { root: [-0.0290, -0.002, 0.080], segments: [0.033, 0.020, 0.016], radii: [0.0083, 0.0065], spread: -0.24, curl: 0.22 },
 ];
 
 /// Sections of the palm along the hand: u to its back, w towards the thumb, metres.
+#[rustfmt::skip]
 const PALM: [Station; 5] = [
-    Station {
-        t: -0.005,
-        c: [0.000, 0.000, 0.0195, 0.0195, 0.0275, 0.0275, 0.1],
-    },
-    Station {
-        t: 0.020,
-        c: [0.000, 0.000, 0.0180, 0.0190, 0.0310, 0.0290, 0.3],
-    },
-    Station {
-        t: 0.050,
-        c: [0.000, 0.000, 0.0150, 0.0170, 0.0370, 0.0360, 0.4],
-    },
-    Station {
-        t: 0.075,
-        c: [0.000, 0.000, 0.0125, 0.0140, 0.0390, 0.0385, 0.4],
-    },
-    Station {
-        t: 0.092,
-        c: [0.000, -0.001, 0.0100, 0.0110, 0.0375, 0.0375, 0.4],
-    },
+    Station { t: -0.005, c: [0.000, 0.000, 0.0195, 0.0195, 0.0275, 0.0275, 0.1] },
+    Station { t: 0.020, c: [0.000, 0.000, 0.0180, 0.0190, 0.0310, 0.0290, 0.3] },
+    Station { t: 0.050, c: [0.000, 0.000, 0.0150, 0.0170, 0.0370, 0.0360, 0.4] },
+    Station { t: 0.075, c: [0.000, 0.000, 0.0125, 0.0140, 0.0390, 0.0385, 0.4] },
+    Station { t: 0.092, c: [0.000, -0.001, 0.0100, 0.0110, 0.0375, 0.0375, 0.4] },
 ];
 
 /// Segments of the thumb: length, radii at both ends, blend, metres.
@@ -165,7 +128,7 @@ impl Hand {
 }
 
 /// Foot sections: z from the ankle, half width, top, x offset, metres; the sole lies on y = 0.
-const FOOT: [[f64; 4]; 9] = [
+const FOOT: [[f64; 4]; 8] = [
     [-0.032, 0.0290, 0.064, 0.000],
     [-0.016, 0.0320, 0.084, 0.000],
     [0.005, 0.0330, 0.092, 0.001],
@@ -174,7 +137,6 @@ const FOOT: [[f64; 4]; 9] = [
     [0.095, 0.0415, 0.052, 0.009],
     [0.122, 0.0450, 0.038, 0.011],
     [0.145, 0.0445, 0.028, 0.011],
-    [0.166, 0.0400, 0.021, 0.010],
 ];
 
 /// Toes: x from the foot's middle towards the body (big toe first), length beyond the ball, radius.
@@ -189,7 +151,7 @@ const TOES: [[f64; 3]; 5] = [
 /// Adds a foot.
 pub(super) fn foot(f: &mut Field, fig: &Figure, j: &Joints) {
     let size = fig.foot();
-    let stations = FOOT[..8]
+    let stations = FOOT
         .iter()
         .map(|r| {
             let (hw, top, x) = (r[1] * size, r[2] * size, r[3] * size);
@@ -225,26 +187,12 @@ pub(super) fn foot(f: &mut Field, fig: &Figure, j: &Joints) {
         );
     }
     // Malleoli, Achilles tendon hollows, arch.
-    f.bump(
-        j.ankle + V3d::new(-0.034, 0.010, 0.006),
-        [0.018, 0.020, 0.020],
-        0.006,
-    );
-    f.bump(
-        j.ankle + V3d::new(0.034, -0.002, -0.004),
-        [0.018, 0.020, 0.020],
-        0.006,
-    );
-    for side in [-1.0, 1.0] {
-        f.bump(
-            j.ankle + V3d::new(0.026 * side, 0.006, -0.032),
-            [0.020, 0.045, 0.020],
-            -0.005,
-        );
+    let at = |x, y, z| j.ankle + V3d::new(x, y, z);
+    f.bump(at(-0.034, 0.010, 0.006), [0.018, 0.020, 0.020], 0.006);
+    f.bump(at(0.034, -0.002, -0.004), [0.018, 0.020, 0.020], 0.006);
+    for x in [-0.026, 0.026] {
+        f.bump(at(x, 0.006, -0.032), [0.020, 0.045, 0.020], -0.005);
     }
-    f.bump(
-        P3d::new(j.ankle.x - 0.030, 0.008, j.ankle.z + 0.050),
-        [0.026, 0.022, 0.050],
-        -0.008,
-    );
+    let arch = P3d::new(j.ankle.x - 0.030, 0.008, j.ankle.z + 0.050);
+    f.bump(arch, [0.026, 0.022, 0.050], -0.008);
 }

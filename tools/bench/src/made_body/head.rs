@@ -59,20 +59,9 @@ fn skull(f: &mut Field, fig: &Figure) {
 /// Bridge, tip and wings.
 fn nose(f: &mut Field) {
     let p = P3d::new;
-    f.cone(
-        p(0.0, 1.594, 0.0800),
-        p(0.0, 1.562, 0.0960),
-        0.0070,
-        0.0090,
-        0.018,
-    );
-    f.cone(
-        p(0.0, 1.562, 0.0960),
-        p(0.0, 1.5545, 0.0990),
-        0.0085,
-        0.0085,
-        0.008,
-    );
+    let [root, tip] = [p(0.0, 1.594, 0.0800), p(0.0, 1.562, 0.0960)];
+    f.cone(root, tip, 0.0070, 0.0090, 0.018);
+    f.cone(tip, p(0.0, 1.5545, 0.0990), 0.0085, 0.0085, 0.008);
     f.ellipsoid(p(0.0105, 1.5525, 0.0890), [0.0068, 0.0060, 0.0090], 0.012);
 }
 
@@ -88,23 +77,13 @@ fn eyes(f: &mut Field) {
 /// Brow and temple, cheekbone, hollow of the cheek, corner of the jaw.
 fn cheeks(f: &mut Field, fig: &Figure) {
     let (s, p) = (fig.sex, P3d::new);
-    f.bump(
-        p(0.024, 1.602, 0.086),
-        [0.030, 0.013, 0.030],
-        0.003 + 0.002 * s,
-    );
+    let brow = 0.003 + 0.002 * s;
+    f.bump(p(0.024, 1.602, 0.086), [0.030, 0.013, 0.030], brow);
     f.bump(p(0.066, 1.602, 0.045), [0.020, 0.030, 0.035], -0.003);
     f.bump(p(0.048, 1.562, 0.060), [0.030, 0.022, 0.035], 0.0045);
-    f.bump(
-        p(0.046, 1.528, 0.050),
-        [0.024, 0.028, 0.035],
-        -0.003 + 0.0015 * fig.girth,
-    );
-    f.bump(
-        p(0.052, 1.500, 0.000),
-        [0.020, 0.024, 0.030],
-        0.003 + 0.002 * s,
-    );
+    let hollow = -0.003 + 0.0015 * fig.girth;
+    f.bump(p(0.046, 1.528, 0.050), [0.024, 0.028, 0.035], hollow);
+    f.bump(p(0.052, 1.500, 0.000), [0.020, 0.024, 0.030], brow);
 }
 
 /// The round of the teeth, lips, the line between, the groove below, chin.
@@ -115,11 +94,8 @@ fn mouth_and_chin(f: &mut Field, fig: &Figure) {
     f.bump(p(0.0, 1.5150, 0.087), [0.027, 0.0090, 0.024], 0.0028);
     f.bump(p(0.0, 1.5213, 0.090), [0.034, 0.0055, 0.030], -0.0034);
     f.bump(p(0.0, 1.503, 0.086), [0.026, 0.009, 0.02], -0.0025);
-    f.bump(
-        p(0.0, 1.486, 0.085),
-        [0.026, 0.018, 0.025],
-        0.005 + 0.0015 * fig.sex,
-    );
+    let chin = 0.005 + 0.0015 * fig.sex;
+    f.bump(p(0.0, 1.486, 0.085), [0.026, 0.018, 0.025], chin);
 }
 
 /// A tilted shell, hollowed.
@@ -137,12 +113,9 @@ fn ear(f: &mut Field) {
         FieldPrimitive::Ellipsoid(ear, V3d::new(0.0065, 0.0175, 0.0310)),
         0.008,
     );
-    f.bump_in(
-        Frame {
-            origin: ear.origin + V3d::new(0.009, 0.002, 0.002),
-            ..ear
-        },
-        [0.012, 0.012, 0.020],
-        -0.006,
-    );
+    let hollow = Frame {
+        origin: ear.origin + V3d::new(0.009, 0.002, 0.002),
+        ..ear
+    };
+    f.bump_in(hollow, [0.012, 0.012, 0.020], -0.006);
 }

@@ -116,11 +116,7 @@ pub(super) fn arm(f: &mut Field, fig: &Figure, j: &Joints) {
     add_tube(f, fig, [j.shoulder, j.elbow], &UPPER_ARM);
     add_tube(f, fig, [j.elbow, j.wrist], &FOREARM);
     // Olecranon: the point of the elbow, behind.
-    f.bump(
-        j.elbow + V3d::new(0.006, 0.0, -0.036),
-        [0.030, 0.030, 0.030],
-        0.005,
-    );
+    f.bump(j.elbow + V3d::new(0.006, 0.0, -0.036), [0.030; 3], 0.005);
 }
 
 /// Adds thigh and shank.
@@ -128,20 +124,9 @@ pub(super) fn leg(f: &mut Field, fig: &Figure, j: &Joints) {
     add_tube(f, fig, [j.hip, j.knee], &THIGH);
     add_tube(f, fig, [j.knee, j.ankle], &SHANK);
     // Kneecap and the hollow of the knee.
-    f.bump(
-        j.knee + V3d::new(0.0, 0.012, 0.056),
-        [0.032, 0.042, 0.035],
-        0.004,
-    );
-    f.bump(
-        j.knee + V3d::new(0.0, 0.0, -0.058),
-        [0.034, 0.055, 0.035],
-        -0.005,
-    );
+    let at = |x, y, z| j.knee + V3d::new(x, y, z);
+    f.bump(at(0.0, 0.012, 0.056), [0.032, 0.042, 0.035], 0.004);
+    f.bump(at(0.0, 0.0, -0.058), [0.034, 0.055, 0.035], -0.005);
     // Vastus medialis above the knee, inside.
-    f.bump(
-        j.knee + V3d::new(-0.036, 0.070, 0.036),
-        [0.035, 0.060, 0.045],
-        0.005,
-    );
+    f.bump(at(-0.036, 0.070, 0.036), [0.035, 0.060, 0.045], 0.005);
 }

@@ -11,28 +11,19 @@ mod head;
 mod limbs;
 mod polygonise;
 pub(crate) mod rig;
+mod settings;
 pub mod statistics;
 mod torso;
 
 use field::Field;
 use figure::{Figure, Joints, STATURE};
+pub use settings::BodySettings;
 use tryon_body::{BodyError, Skeleton, Template};
 use tryon_geometry::math::{P3, P3d};
 use tryon_geometry::mesh::{Border, Face, RemeshSpec, Remesher, Topology, TriMesh};
 
 /// Name of the template.
 const NAME: &str = "embedded";
-/// Rounds of remeshing; more change no angle by a degree.
-const ROUNDS: usize = 5;
-/// Rounds of flips and relaxation after them.
-const LAST_ROUNDS: usize = 2;
-/// Share of the way to the neighbours' centroid per relaxation.
-const RELAXATION: f64 = 0.6;
-/// Newton steps that bring a relaxed vertex back to the surface.
-const PROJECTION_STEPS: usize = 3;
-/// Target edge lengths, metres: trunk and limbs, head, face, hand, foot. Together they give 12,000 to 14,000 vertices.
-const EDGES: [f64; 5] = [0.0153, 0.0098, 0.0052, 0.0060, 0.0085];
-
 /// The implicit surface of a figure.
 fn carve(fig: &Figure, j: &Joints) -> Field {
     let mut f = Field::default();
@@ -46,46 +37,47 @@ fn carve(fig: &Figure, j: &Joints) -> Field {
 }
 
 /// Target edge length at a point: blends between the regions over a few centimetres.
-fn edge_length(j: &Joints, p: &P3d) -> f64 {
+fn edge_length(edges: &[f64; 5], j: &Joints, p: &P3d) -> f64 {
     let ramp = |x: f64, a: f64, b: f64| ((x - a) / (b - a)).clamp(0.0, 1.0);
     let mix = |a: f64, b: f64, t: f64| a + (b - a) * t;
-    let head = mix(EDGES[0], EDGES[1], ramp(p.y, 1.40, 1.48));
+    let head = mix(edges[0], edges[1], ramp(p.y, 1.40, 1.48));
     let face = mix(
         head,
-        EDGES[2],
+        edges[2],
         ramp(p.z, 0.03, 0.07) * ramp(p.y, 1.44, 1.49) * (1.0 - ramp(p.y, 1.60, 1.64)),
     );
     let face = mix(
         face,
-        EDGES[2],
+        edges[2],
         ramp(p.x, 0.066, 0.074) * ramp(p.y, 1.52, 1.54) * (1.0 - ramp(p.y, 1.61, 1.63)),
     );
     let along = (p - j.wrist).dot(&(j.hand_end - j.wrist).normalize());
     let hand = if p.x > 0.3 {
-        mix(face, EDGES[3], ramp(along, -0.05, 0.03))
+        mix(face, edges[3], ramp(along, -0.05, 0.03))
     } else {
         face
     };
-    mix(hand, EDGES[4], 1.0 - ramp(p.y, 0.06, 0.14))
+    mix(hand, edges[4], 1.0 - ramp(p.y, 0.06, 0.14))
 }
 
 /// The left half with edges of the target lengths, its cut at x = 0 in the mirror plane.
 fn remeshed(
+    settings: &BodySettings,
     field: &Field,
     j: &Joints,
     points: Vec<P3d>,
     faces: Vec<Face>,
 ) -> (Vec<P3d>, Vec<Face>) {
     let spec = RemeshSpec {
-        target: &|p| edge_length(j, p),
-        project: &|p| field.project(p, PROJECTION_STEPS),
+        target: &|p| edge_length(&settings.edges, j, p),
+        project: &|p| field.project(p, settings.projection_steps),
         border: Border::MirrorPlane,
         graded: true,
         keep_creases: false,
-        relaxation: RELAXATION,
+        relaxation: settings.relaxation,
     };
     let mut remesher = Remesher::new(points, faces, spec);
-    for round in 0..ROUNDS {
+    for round in 0..settings.rounds {
         // The polygoniser's edges are short everywhere.
         if round > 0 {
             remesher.split();
@@ -94,7 +86,7 @@ fn remeshed(
         remesher.flip();
         remesher.relax();
     }
-    for _ in 0..LAST_ROUNDS {
+    for _ in 0..settings.last_rounds {
         remesher.flip();
         remesher.relax();
     }
@@ -132,15 +124,17 @@ fn whole(half: &[P3d], faces: &[Face]) -> (Vec<P3d>, Vec<Face>, Vec<u32>) {
 /// # Errors
 /// None in a correct build.
 pub fn generate() -> Result<Template, BodyError> {
+    let settings = BodySettings::default();
     let fig = Figure::default();
     let j = fig.joints();
     let field = carve(&fig, &j);
     let (points, faces) = polygonise::polygonise(
+        &settings,
         &field,
         P3d::new(0.0, -0.03, -0.25),
         P3d::new(0.75, STATURE + 0.05, 0.30),
     );
-    let (half, half_faces) = remeshed(&field, &j, points, faces);
+    let (half, half_faces) = remeshed(&settings, &field, &j, points, faces);
     let (points, faces, mirror) = whole(&half, &half_faces);
     let joints = rig::joints(&j);
     let skeleton = Skeleton::new(joints)?;
@@ -149,12 +143,13 @@ pub fn generate() -> Result<Template, BodyError> {
         .map(|p| P3::new(p.x as f32, p.y as f32, p.z as f32))
         .collect();
     let mesh = TriMesh::new(vertices, faces)?;
-    let weights = rig::skin_weights(&j, &points, &Topology::new(&mesh)?, &skeleton)?;
+    let weights = rig::skin_weights(&settings, &j, &points, &Topology::new(&mesh)?, &skeleton)?;
     let plain = Template::new(NAME, mesh, skeleton, weights, None)?;
     let space = directions::shape_space(&directions::ShapeSource {
         template: &plain,
         points: &points,
         mirror: &mirror,
+        settings: &settings,
     })?;
     Template::new(
         NAME,

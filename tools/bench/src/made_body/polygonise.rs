@@ -1,19 +1,16 @@
 //! Marching tetrahedra over the cells that the surface can pass, left half only; always a manifold.
 
+use super::BodySettings;
 use super::field::Field;
 use std::collections::BTreeMap;
 use tryon_geometry::math::P3d;
 use tryon_geometry::mesh::Face;
 use tryon_geometry::par::{self, Par};
 
-/// Grid spacing, metres: three cells across a finger.
-const CELL: f64 = 0.0065;
 /// Cells along the edge of a block.
 const BLOCK: i32 = 4;
 /// Nodes along the edge of a block.
 const SIDE: usize = (BLOCK + 1) as usize;
-/// Smallest distance value kept at a grid node, metres.
-const NODE_GAP: f64 = 1e-5;
 /// Levels of blocks above the smallest; each level doubles the edge.
 const LEVELS: u32 = 3;
 /// The six tetrahedra around the diagonal of a cube; corners are bits x, y, z.
@@ -28,72 +25,81 @@ const TETRAHEDRA: [[usize; 4]; 6] = [
 
 type Node = [i32; 3];
 
-fn position(n: &Node) -> P3d {
-    P3d::new(
-        f64::from(n[0]) * CELL,
-        f64::from(n[1]) * CELL,
-        f64::from(n[2]) * CELL,
-    )
+/// A field on a grid.
+struct Grid<'a> {
+    field: &'a Field,
+    settings: &'a BodySettings,
 }
 
-/// Blocks (by their lowest node) that may hold a piece of the surface.
-fn blocks(field: &Field, lo: Node, hi: Node) -> Vec<Node> {
-    let mut edge = BLOCK << LEVELS;
-    let mut list = Vec::new();
-    for x in (lo[0]..hi[0]).step_by(edge as usize) {
-        for y in (lo[1]..hi[1]).step_by(edge as usize) {
-            for z in (lo[2]..hi[2]).step_by(edge as usize) {
-                list.push([x, y, z]);
+impl Grid<'_> {
+    fn position(&self, n: &Node) -> P3d {
+        P3d::from(n.map(|k| f64::from(k) * self.settings.cell))
+    }
+
+    /// Blocks (by their lowest node) that may hold a piece of the surface.
+    fn blocks(&self, lo: Node, hi: Node) -> Vec<Node> {
+        let mut edge = BLOCK << LEVELS;
+        let mut list = Vec::new();
+        for x in (lo[0]..hi[0]).step_by(edge as usize) {
+            for y in (lo[1]..hi[1]).step_by(edge as usize) {
+                for z in (lo[2]..hi[2]).step_by(edge as usize) {
+                    list.push([x, y, z]);
+                }
             }
         }
-    }
-    loop {
-        // The estimate may be off by a third; half the diagonal with that margin.
-        let reach = 0.87 * 1.4 * f64::from(edge) * CELL;
-        let mut keep = Vec::new();
-        par::map_into(Par::Rayon, list.len(), 64, &mut keep, |i| {
-            let half = f64::from(edge) * 0.5 * CELL;
-            let c = position(&list[i]) + nalgebra::Vector3::repeat(half);
-            field.value(&c).abs() < reach
-        });
-        list = list
-            .iter()
-            .zip(&keep)
-            .filter(|(_, k)| **k)
-            .map(|(b, _)| *b)
-            .collect();
-        if edge == BLOCK {
-            return list;
-        }
-        edge /= 2;
-        list = list
-            .iter()
-            .flat_map(|b| {
-                (0..8).map(move |k| {
-                    [
-                        b[0] + edge * (k & 1),
-                        b[1] + edge * (k >> 1 & 1),
-                        b[2] + edge * (k >> 2),
-                    ]
+        loop {
+            // The estimate may be off by a third; half the diagonal with that margin.
+            let reach = 0.87 * 1.4 * f64::from(edge) * self.settings.cell;
+            let mut keep = Vec::new();
+            par::map_into(Par::Rayon, list.len(), 64, &mut keep, |i| {
+                let half = f64::from(edge) * 0.5 * self.settings.cell;
+                let c = self.position(&list[i]) + nalgebra::Vector3::repeat(half);
+                self.field.value(&c).abs() < reach
+            });
+            list = list
+                .iter()
+                .zip(&keep)
+                .filter(|(_, k)| **k)
+                .map(|(b, _)| *b)
+                .collect();
+            if edge == BLOCK {
+                return list;
+            }
+            edge /= 2;
+            list = list
+                .iter()
+                .flat_map(|b| {
+                    (0..8).map(move |k| {
+                        [
+                            b[0] + edge * (k & 1),
+                            b[1] + edge * (k >> 1 & 1),
+                            b[2] + edge * (k >> 2),
+                        ]
+                    })
                 })
-            })
-            .collect();
-    }
-}
-
-/// Field values at the nodes of a block, x fastest.
-fn node_values(field: &Field, block: &Node) -> Vec<f64> {
-    let mut values = Vec::with_capacity(SIDE * SIDE * SIDE);
-    for z in 0..=BLOCK {
-        for y in 0..=BLOCK {
-            for x in 0..=BLOCK {
-                let d = field.value(&position(&[block[0] + x, block[1] + y, block[2] + z]));
-                // Never exactly on a node, nor so near that an edge has no length.
-                values.push(if d.abs() < NODE_GAP { NODE_GAP } else { d });
-            }
+                .collect();
         }
     }
-    values
+
+    /// Field values at the nodes of a block, x fastest.
+    fn node_values(&self, block: &Node) -> Vec<f64> {
+        let gap = self.settings.node_gap;
+        let mut values = Vec::with_capacity(SIDE * SIDE * SIDE);
+        for z in 0..=BLOCK {
+            for y in 0..=BLOCK {
+                for x in 0..=BLOCK {
+                    let d = self.field.value(&self.position(&[
+                        block[0] + x,
+                        block[1] + y,
+                        block[2] + z,
+                    ]));
+                    // Never exactly on a node, nor so near that an edge has no length.
+                    values.push(if d.abs() < gap { gap } else { d });
+                }
+            }
+        }
+        values
+    }
 }
 
 /// The corners of a cube: nodes and field values, by bits x, y, z.
@@ -128,21 +134,22 @@ impl Cube {
 }
 
 /// The surface while cubes are added; vertices on shared edges are shared.
-#[derive(Default)]
-struct Polygons {
+struct Polygons<'a> {
+    grid: Grid<'a>,
     vertices: Vec<P3d>,
     faces: Vec<Face>,
     cuts: BTreeMap<(Node, Node), u32>,
 }
 
-impl Polygons {
+impl Polygons<'_> {
     /// The vertex between an inner and an outer corner of a cube.
     fn cut(&mut self, cube: &Cube, inner: usize, outer: usize) -> u32 {
         let (p, q) = (cube.nodes[inner], cube.nodes[outer]);
         let key = if p < q { (p, q) } else { (q, p) };
         *self.cuts.entry(key).or_insert_with(|| {
             let s = cube.values[inner] / (cube.values[inner] - cube.values[outer]);
-            let vertex = position(&p) + (position(&q) - position(&p)) * s;
+            let [p, q] = [p, q].map(|n| self.grid.position(&n));
+            let vertex = p + (q - p) * s;
             self.vertices.push(vertex);
             (self.vertices.len() - 1) as u32
         })
@@ -150,7 +157,10 @@ impl Polygons {
     /// A face that points away from an inner node.
     fn push(&mut self, f: Face, inner: &Node) {
         let [x, y, z] = f.map(|i| self.vertices[i as usize]);
-        let outward = (y - x).cross(&(z - x)).dot(&(x - position(inner))) > 0.0;
+        let outward = (y - x)
+            .cross(&(z - x))
+            .dot(&(x - self.grid.position(inner)))
+            > 0.0;
         self.faces
             .push(if outward { f } else { [f[0], f[2], f[1]] });
     }
@@ -177,20 +187,25 @@ impl Polygons {
 
 /// The zero level of `field` for x ≥ 0 between `lo` and `hi` (metres): vertices and outward faces.
 /// The boundary lies exactly on x = 0.
-pub(super) fn polygonise(field: &Field, lo: P3d, hi: P3d) -> (Vec<P3d>, Vec<Face>) {
-    let node = |p: &P3d| -> Node {
-        [
-            (p.x / CELL).floor() as i32,
-            (p.y / CELL).floor() as i32,
-            (p.z / CELL).floor() as i32,
-        ]
-    };
-    let blocks = blocks(field, node(&lo), node(&hi));
+pub(super) fn polygonise(
+    settings: &BodySettings,
+    field: &Field,
+    lo: P3d,
+    hi: P3d,
+) -> (Vec<P3d>, Vec<Face>) {
+    let node = |p: P3d| -> Node { [p.x, p.y, p.z].map(|x| (x / settings.cell).floor() as i32) };
+    let grid = Grid { field, settings };
+    let blocks = grid.blocks(node(lo), node(hi));
     let mut values: Vec<Vec<f64>> = Vec::new();
     par::map_into(Par::Rayon, blocks.len(), 16, &mut values, |i| {
-        node_values(field, &blocks[i])
+        grid.node_values(&blocks[i])
     });
-    let mut out = Polygons::default();
+    let mut out = Polygons {
+        grid,
+        vertices: Vec::new(),
+        faces: Vec::new(),
+        cuts: BTreeMap::new(),
+    };
     for (block, values) in blocks.iter().zip(&values) {
         for cell in 0..BLOCK * BLOCK * BLOCK {
             let cube = Cube::new(block, values, cell);

@@ -1,5 +1,6 @@
 //! The skeleton of the figure and its skinning weights.
 
+use super::BodySettings;
 use super::figure::Joints;
 use tryon_body::{BodyError, Joint, JointMotion, Skeleton, SkinWeights};
 use tryon_geometry::math::{P3d, V3d};
@@ -146,22 +147,18 @@ fn distance_to_arm(j: &Joints, p: &P3d) -> f64 {
     .fold(f64::INFINITY, f64::min)
 }
 
-/// The chest under the armpits as an elliptic cylinder: half width, half depth and middle in z, metres.
-const CHEST: [f64; 3] = [0.165, 0.118, 0.0];
-/// Radius of the upper arm near the armpit, metres.
-const ARM: f64 = 0.050;
-
 /// Share of the arm's subtree at a point.
-fn arm_share(j: &Joints, p: &P3d) -> f64 {
+fn arm_share(settings: &BodySettings, j: &Joints, p: &P3d) -> f64 {
+    let [width, depth, middle] = settings.chest;
     // A plane through the shoulder joint, tilted so that the armpit belongs to both arm and trunk.
     let at = j.shoulder + V3d::new(-0.014, 0.0, 0.0);
     let cut = beyond(p, &at, V3d::new(0.98, -0.12, 0.0), 0.085);
     // A point nearer to the chest than to the arm stays with the chest; far from the arm there is no arm at all.
     let reach = distance_to_arm(j, p);
-    let (ex, ez) = (p.x / CHEST[0], (p.z - CHEST[2]) / CHEST[1]);
-    let from_chest = ((ex * ex + ez * ez).sqrt() - 1.0) * 0.5 * (CHEST[0] + CHEST[1]);
+    let (ex, ez) = (p.x / width, (p.z - middle) / depth);
+    let from_chest = ((ex * ex + ez * ez).sqrt() - 1.0) * 0.5 * (width + depth);
     let below = smooth((j.shoulder.y - 0.02 - p.y) / 0.03);
-    let apart = 1.0 - below * (1.0 - smooth((from_chest - (reach - ARM)) / 0.035));
+    let apart = 1.0 - below * (1.0 - smooth((from_chest - (reach - settings.arm)) / 0.035));
     cut * apart * smooth((0.115 - reach) / 0.025)
 }
 
@@ -188,9 +185,9 @@ fn beyond_hinge(p: &P3d, [a, b, c]: [P3d; 3], width: f64) -> f64 {
 }
 
 /// Weights of a point of the left half (x ≥ 0) by joint name; shares of subtrees are multiplied down the tree.
-pub(super) fn weights(j: &Joints, p: &P3d) -> Vec<(&'static str, f64)> {
+pub(super) fn weights(settings: &BodySettings, j: &Joints, p: &P3d) -> Vec<(&'static str, f64)> {
     let up = V3d::y();
-    let arm = arm_share(j, p);
+    let arm = arm_share(settings, j, p);
     let elbow = beyond_hinge(p, [j.shoulder, j.elbow, j.wrist], 0.038);
     let wrist = beyond_hinge(p, [j.elbow, j.wrist, j.hand_end], 0.030);
     let collar = girdle_share(p).max(arm);
@@ -234,23 +231,19 @@ pub(super) fn weights(j: &Joints, p: &P3d) -> Vec<(&'static str, f64)> {
     ]
 }
 
-/// Passes of smoothing: they take the kinks out of the products above, over about 4 cm on the trunk.
-const SMOOTHING: usize = 16;
-
-/// Smallest weight that is kept: four joints a vertex show no less.
-const LEAST_WEIGHT: f64 = 0.01;
-
 /// Weights of all vertices: evaluated on the left, mirrored, then smoothed along the surface.
 ///
 /// # Errors
 /// Names a vertex without weight; none in a correct build.
 pub(super) fn skin_weights(
+    settings: &BodySettings,
     j: &Joints,
     points: &[P3d],
     topology: &Topology,
     skeleton: &Skeleton,
 ) -> Result<SkinWeights, BodyError> {
-    let names: Vec<&str> = weights(j, &j.pelvis).into_iter().map(|(n, _)| n).collect();
+    let names = weights(settings, j, &j.pelvis).into_iter().map(|(n, _)| n);
+    let names: Vec<&str> = names.collect();
     let left: Vec<Option<usize>> = names.iter().map(|n| skeleton.index(n)).collect();
     let right: Vec<Option<usize>> = names
         .iter()
@@ -261,7 +254,7 @@ pub(super) fn skin_weights(
     par::map_into(Par::Rayon, points.len(), 256, &mut rows, |i| {
         let p = points[i];
         let mut row = vec![0.0; joints];
-        for (k, (_, w)) in weights(j, &P3d::new(p.x.abs(), p.y, p.z))
+        for (k, (_, w)) in weights(settings, j, &P3d::new(p.x.abs(), p.y, p.z))
             .into_iter()
             .enumerate()
         {
@@ -275,13 +268,13 @@ pub(super) fn skin_weights(
         }
         row
     });
-    for _ in 0..SMOOTHING {
+    for _ in 0..settings.weight_smoothing {
         rows = smoothed(Par::Rayon, topology.vertex_neighbours(), &rows);
     }
     let kept = rows.into_iter().map(|r| {
         r.into_iter()
             .enumerate()
-            .filter(|(_, w)| *w > LEAST_WEIGHT)
+            .filter(|(_, w)| *w > settings.least_weight)
             .collect()
     });
     SkinWeights::from_rows(kept)

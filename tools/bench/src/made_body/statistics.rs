@@ -10,11 +10,17 @@ pub struct Statistic {
     pub men: [f64; 2],
     /// Women: mean, standard deviation.
     pub women: [f64; 2],
+    /// Correlation within a sex, rounded: of a girth with body mass, of a length or breadth with stature; 0 where unused.
+    pub correlation: f64,
 }
 
 impl Statistic {
-    const fn new(men: [f64; 2], women: [f64; 2]) -> Self {
-        Self { men, women }
+    const fn new(men: [f64; 2], women: [f64; 2], correlation: f64) -> Self {
+        Self {
+            men,
+            women,
+            correlation,
+        }
     }
     /// Middle between the means of both sexes.
     pub const fn mean(&self) -> f64 {
@@ -28,42 +34,30 @@ impl Statistic {
     pub const fn sex(&self) -> f64 {
         0.5 * (self.men[0] - self.women[0])
     }
-    /// Standard deviation at a given value of another measure with correlation `r`.
-    pub fn residual(&self, r: f64) -> f64 {
+    /// Standard deviation at a given body mass or stature.
+    pub fn residual(&self) -> f64 {
+        let r = self.correlation;
         self.deviation() * (1.0 - r * r).sqrt()
     }
 }
 
 /// Stature.
-pub const STATURE: Statistic = Statistic::new([1.756, 0.069], [1.628, 0.064]);
+pub const STATURE: Statistic = Statistic::new([1.756, 0.069], [1.628, 0.064], 0.0);
 /// Chest circumference (at bust point height).
-pub const CHEST: Statistic = Statistic::new([1.059, 0.087], [0.947, 0.083]);
+pub const CHEST: Statistic = Statistic::new([1.059, 0.087], [0.947, 0.083], 0.90);
 /// Waist circumference (omphalion).
-pub const WAIST: Statistic = Statistic::new([0.941, 0.112], [0.861, 0.100]);
+pub const WAIST: Statistic = Statistic::new([0.941, 0.112], [0.861, 0.100], 0.90);
 /// Buttock circumference.
-pub const HIP: Statistic = Statistic::new([1.020, 0.076], [1.021, 0.076]);
+pub const HIP: Statistic = Statistic::new([1.020, 0.076], [1.021, 0.076], 0.93);
 /// Neck circumference.
-pub const NECK: Statistic = Statistic::new([0.398, 0.026], [0.330, 0.018]);
+pub const NECK: Statistic = Statistic::new([0.398, 0.026], [0.330, 0.018], 0.0);
 /// Thigh circumference, under the fold of the buttock.
-pub const THIGH: Statistic = Statistic::new([0.625, 0.058], [0.617, 0.056]);
+pub const THIGH: Statistic = Statistic::new([0.625, 0.058], [0.617, 0.056], 0.0);
 /// Calf circumference.
-pub const CALF: Statistic = Statistic::new([0.392, 0.029], [0.372, 0.029]);
+pub const CALF: Statistic = Statistic::new([0.392, 0.029], [0.372, 0.029], 0.0);
 /// Biacromial breadth.
-pub const SHOULDERS: Statistic = Statistic::new([0.416, 0.019], [0.365, 0.018]);
+pub const SHOULDERS: Statistic = Statistic::new([0.416, 0.019], [0.365, 0.018], 0.45);
 /// Crotch height.
-pub const CROTCH: Statistic = Statistic::new([0.846, 0.046], [0.779, 0.045]);
+pub const CROTCH: Statistic = Statistic::new([0.846, 0.046], [0.779, 0.045], 0.87);
 /// Sitting height.
-pub const SITTING: Statistic = Statistic::new([0.918, 0.036], [0.857, 0.033]);
-
-/// Correlations within a sex, rounded, same survey: body mass with chest, waist and hip girths.
-pub(super) const MASS_CHEST: f64 = 0.90;
-/// See [`MASS_CHEST`].
-pub(super) const MASS_WAIST: f64 = 0.90;
-/// See [`MASS_CHEST`].
-pub(super) const MASS_HIP: f64 = 0.93;
-/// Correlations of stature with crotch height, sitting height and biacromial breadth.
-pub(super) const STATURE_CROTCH: f64 = 0.87;
-/// See [`STATURE_CROTCH`].
-pub(super) const STATURE_SITTING: f64 = 0.79;
-/// See [`STATURE_CROTCH`].
-pub(super) const STATURE_SHOULDERS: f64 = 0.45;
+pub const SITTING: Statistic = Statistic::new([0.918, 0.036], [0.857, 0.033], 0.79);

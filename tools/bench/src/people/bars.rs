@@ -1,6 +1,7 @@
 //! Bars of a release: measure, value, number of cases and worst cases, as Markdown and JSON.
 
 use crate::EvaluateError;
+use crate::table::write_report;
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 use tryon_geometry::math::order_statistics;
@@ -22,19 +23,18 @@ pub struct Bar {
 
 impl Bar {
     /// A bar without worst cases.
-    pub(super) fn new(
-        row: &'static str,
-        measure: impl Into<String>,
-        value: f64,
-        cases: usize,
-    ) -> Self {
+    pub(super) fn new(measure: impl Into<String>, value: f64, cases: usize) -> Self {
         Self {
-            row,
+            row: "",
             measure: measure.into(),
             value,
             cases,
             worst: Vec::new(),
         }
+    }
+    /// The same of a row.
+    pub(super) fn of(self, row: &'static str) -> Self {
+        Self { row, ..self }
     }
     /// Adds the names of the worst cases.
     pub(super) fn worst(mut self, names: Vec<String>) -> Self {
@@ -106,24 +106,9 @@ impl BarTable {
     ///
     /// # Errors
     /// Names the file that cannot be written.
-    pub fn write(&self, dir: &Path) -> Result<Vec<PathBuf>, EvaluateError> {
-        let fault = |path: &Path, source| EvaluateError::File {
-            path: path.to_owned(),
-            source,
-        };
-        std::fs::create_dir_all(dir).map_err(|e| fault(dir, e))?;
+    pub fn write(&self, dir: &Path) -> Result<[PathBuf; 2], EvaluateError> {
         let json = serde_json::to_value(self).unwrap_or_default();
-        let files = [
-            ("people.md", self.to_markdown()),
-            ("people.json", format!("{json:#}\n")),
-        ];
-        let mut written = Vec::new();
-        for (name, text) in files {
-            let path = dir.join(name);
-            std::fs::write(&path, text).map_err(|e| fault(&path, e))?;
-            written.push(path);
-        }
-        Ok(written)
+        write_report(dir, "people", self.to_markdown(), &json)
     }
 }
 
@@ -146,7 +131,9 @@ mod tests {
             ("b".into(), f64::NAN),
             ("c".into(), 30.2),
         ];
-        let bar = Bar::new("poses", "found [%]", 50.0, 2).worst(greatest(cases, " mm"));
+        let bar = Bar::new("found [%]", 50.0, 2)
+            .of("poses")
+            .worst(greatest(cases, " mm"));
         assert_eq!(bar.worst, ["c 30 mm", "a 1 mm"]);
         let table = BarTable {
             bars: vec![bar],
@@ -156,10 +143,5 @@ mod tests {
         let text = table.to_markdown();
         assert!(text.contains("| poses | found [%] | 50.0 | 2 | c 30 mm, a 1 mm |"));
         assert!(text.contains("SKIPPED: uva: no folder"));
-        let dir = tempfile::tempdir().expect("folder");
-        assert_eq!(
-            table.write(&dir.path().join("new")).expect("written").len(),
-            2
-        );
     }
 }

@@ -38,127 +38,37 @@ const fn belly(depth: f32, height: f32, radius: [f32; 2]) -> Option<Belly> {
     })
 }
 
-/// The bodies. Every third one (index 2, 5, …) is kept apart, see [`super::CaseSet`].
+/// The average young woman.
+const AVERAGE: Recipe = Recipe {
+    name: "average",
+    sex: "female",
+    build: &[],
+    measures: &[],
+    physique: PLAIN,
+};
+
+/// The bodies. Every third one (index 2, 5, …) is kept apart, see [`super::PeoplePlan::unseen`].
+#[rustfmt::skip]
 const RECIPES: [Recipe; 12] = [
-    Recipe {
-        name: "old_man_belly",
-        sex: "male",
-        build: &[("minmuscle-averageweight", 0.6)],
-        measures: &[("waist-circ-incr", 0.6), ("neck-circ-decr", 0.4)],
-        physique: Physique {
-            belly: belly(0.12, 0.60, [0.16, 0.17]),
-            scale: 0.97,
-            stoop: 0.30,
-            ..PLAIN
-        },
-    },
-    Recipe {
-        name: "old_woman",
-        sex: "female",
-        build: &[("minmuscle-averageweight", 0.9)],
-        measures: &[("hips-circ-incr", 0.5), ("waist-circ-incr", 0.6)],
-        physique: Physique {
-            scale: 0.93,
-            stoop: 0.50,
-            ..PLAIN
-        },
-    },
-    Recipe {
-        name: "very_tall",
-        sex: "male",
-        build: &[],
-        measures: &[],
-        physique: Physique {
-            legs: 1.08,
-            scale: 1.12,
-            ..PLAIN
-        },
-    },
-    Recipe {
-        name: "very_short",
-        sex: "female",
-        build: &[],
-        measures: &[],
-        physique: Physique {
-            legs: 0.90,
-            head: 1.08,
-            scale: 0.89,
-            ..PLAIN
-        },
-    },
-    Recipe {
-        name: "heavy_woman",
-        sex: "female",
-        build: &[("averagemuscle-maxweight", 1.35)],
-        measures: &[("hips-circ-incr", 0.6)],
-        physique: PLAIN,
-    },
-    Recipe {
-        name: "heavy_man",
-        sex: "male",
-        build: &[("averagemuscle-maxweight", 1.9)],
-        measures: &[],
-        physique: Physique {
-            belly: belly(0.12, 0.60, [0.20, 0.22]),
-            ..PLAIN
-        },
-    },
-    Recipe {
-        name: "pregnant",
-        sex: "female",
-        build: &[],
-        measures: &[("bust-circ-incr", 0.5)],
-        physique: Physique {
-            belly: belly(0.16, 0.60, [0.15, 0.15]),
-            ..PLAIN
-        },
-    },
-    Recipe {
-        name: "muscular",
-        sex: "male",
-        build: &[("maxmuscle-averageweight", 1.3)],
-        measures: &[("shoulder-dist-incr", 0.7)],
-        physique: PLAIN,
-    },
-    Recipe {
-        name: "child",
-        sex: "female",
-        build: &[("minmuscle-averageweight", 0.8)],
-        measures: &[("hips-circ-decr", 0.8), ("bust-circ-decr", 1.0)],
-        physique: Physique {
-            legs: 0.90,
-            head: 1.28,
-            scale: 0.72,
-            ..PLAIN
-        },
-    },
-    Recipe {
-        name: "very_thin",
-        sex: "male",
-        build: &[("minmuscle-minweight", 1.2)],
-        measures: &[],
-        physique: PLAIN,
-    },
-    Recipe {
-        name: "wide_coat",
-        sex: "male",
-        build: &[],
-        measures: &[],
-        physique: Physique {
-            covering: Some(Covering::WideCoat),
-            ..PLAIN
-        },
-    },
-    Recipe {
-        name: "long_hair",
-        sex: "female",
-        build: &[],
-        measures: &[],
-        physique: Physique {
-            covering: Some(Covering::LongHair),
-            ..PLAIN
-        },
-    },
+    Recipe { name: "old_man_belly", sex: "male", build: &[("minmuscle-averageweight", 0.6)], measures: &[("waist-circ-incr", 0.6), ("neck-circ-decr", 0.4)],
+        physique: Physique { belly: belly(0.12, 0.60, [0.16, 0.17]), scale: 0.97, stoop: 0.30, ..PLAIN }, ..AVERAGE },
+    Recipe { name: "old_woman", sex: "female", build: &[("minmuscle-averageweight", 0.9)], measures: &[("hips-circ-incr", 0.5), ("waist-circ-incr", 0.6)],
+        physique: Physique { scale: 0.93, stoop: 0.50, ..PLAIN }, ..AVERAGE },
+    Recipe { name: "very_tall", sex: "male", physique: Physique { legs: 1.08, scale: 1.12, ..PLAIN }, ..AVERAGE },
+    Recipe { name: "very_short", sex: "female", physique: Physique { legs: 0.90, head: 1.08, scale: 0.89, ..PLAIN }, ..AVERAGE },
+    Recipe { name: "heavy_woman", sex: "female", build: &[("averagemuscle-maxweight", 1.35)],
+        measures: &[("hips-circ-incr", 0.6)], ..AVERAGE },
+    Recipe { name: "heavy_man", sex: "male", build: &[("averagemuscle-maxweight", 1.9)],
+        physique: Physique { belly: belly(0.12, 0.60, [0.20, 0.22]), ..PLAIN }, ..AVERAGE },
+    Recipe { name: "pregnant", sex: "female", measures: &[("bust-circ-incr", 0.5)],
+        physique: Physique { belly: belly(0.16, 0.60, [0.15, 0.15]), ..PLAIN }, ..AVERAGE },
+    Recipe { name: "muscular", sex: "male", build: &[("maxmuscle-averageweight", 1.3)],
+        measures: &[("shoulder-dist-incr", 0.7)], ..AVERAGE },
+    Recipe { name: "child", sex: "female", build: &[("minmuscle-averageweight", 0.8)], measures: &[("hips-circ-decr", 0.8), ("bust-circ-decr", 1.0)],
+        physique: Physique { legs: 0.90, head: 1.28, scale: 0.72, ..PLAIN }, ..AVERAGE },
+    Recipe { name: "very_thin", sex: "male", build: &[("minmuscle-minweight", 1.2)], ..AVERAGE },
+    Recipe { name: "wide_coat", sex: "male", physique: Physique { covering: Some(Covering::WideCoat), ..PLAIN }, ..AVERAGE },
+    Recipe { name: "long_hair", sex: "female", physique: Physique { covering: Some(Covering::LongHair), ..PLAIN }, ..AVERAGE },
 ];
 
 /// Base body of which the recipes are changes.
@@ -219,12 +129,6 @@ impl<'a> MorphBase<'a> {
     }
 }
 
-/// True for a body with a coat or long hair as part of its surface.
-pub(super) fn is_covered(name: &str) -> bool {
-    let recipe = RECIPES.iter().find(|r| r.name == name);
-    recipe.is_some_and(|r| r.physique.covering.is_some())
-}
-
 /// All bodies; none without `data` or without the base mesh in it.
 ///
 /// # Errors
@@ -233,10 +137,7 @@ pub(super) fn bodies(data: Option<&Path>) -> Result<Vec<Person>, EvaluateError> 
     let Some(data) = data.filter(|d| d.join(FOLDER).exists()) else {
         return Ok(vec![]);
     };
-    let fault = |name: &str, why: String| EvaluateError::Scene {
-        scene: name.to_owned(),
-        why,
-    };
+    let fault = |name: &str, why: String| EvaluateError::new(name, why);
     let folder = data.join(FOLDER);
     let base = MorphBase::read(data, &folder).map_err(|why| fault(FOLDER, why))?;
     let person = |recipe: &Recipe| {
@@ -271,14 +172,7 @@ mod tests {
             return;
         };
         let base = MorphBase::read(&data, &folder).expect("base");
-        let average = Recipe {
-            name: "average",
-            sex: "female",
-            build: &[],
-            measures: &[],
-            physique: PLAIN,
-        };
-        let arrays = base.build(&average).expect("targets");
+        let arrays = base.build(&AVERAGE).expect("targets");
         let ours = PLAIN.template("average", &arrays).expect("a body");
         let theirs = crate::scenes::subject(&data, "subject_f_avg").expect("a body");
         let off = |a: &tryon_body::Joint| {

@@ -1,5 +1,6 @@
 //! Joints that mean the same in every skeleton, their errors, and the offsets between conventions.
 
+use super::settings::PeopleSettings;
 use crate::tracking::{mean, median};
 use nalgebra::{Matrix3, Vector3};
 use tryon_body::Skeleton;
@@ -86,11 +87,6 @@ pub(super) fn errors_mm(ours: &Points, truth: &Points) -> [f64; COUNT] {
     std::array::from_fn(|k| (ours[k] - truth[k]).norm() * 1e3)
 }
 
-/// Largest mean and joint error of a usable pose, millimetres; the limits of the real recordings' judges.
-const USABLE_MEAN: f64 = 120.0;
-/// See [`USABLE_MEAN`].
-const USABLE_WORST: f64 = 300.0;
-
 /// Errors of one frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct FrameError {
@@ -120,8 +116,8 @@ impl FrameError {
         }
     }
     /// Mean or worst joint above the limits of a usable pose; also without any joint.
-    pub(super) fn is_bad(&self) -> bool {
-        !(self.mean <= USABLE_MEAN && self.worst <= USABLE_WORST)
+    pub(super) fn is_bad(&self, settings: &PeopleSettings) -> bool {
+        !(self.mean <= settings.usable_mean && self.worst <= settings.usable_worst)
     }
 }
 
@@ -161,24 +157,13 @@ mod tests {
     use super::*;
 
     /// A standing figure that faces −z of the camera: left is +x, up is −y.
+    #[rustfmt::skip]
     fn figure() -> Points {
-        let at = |x: f64, y: f64| P3d::new(x, -y, 2.0);
         [
-            at(0.2, 1.4),
-            at(-0.2, 1.4),
-            at(0.3, 1.1),
-            at(-0.3, 1.1),
-            at(0.3, 0.9),
-            at(-0.3, 0.9),
-            at(0.1, 0.9),
-            at(-0.1, 0.9),
-            at(0.1, 0.5),
-            at(-0.1, 0.5),
-            at(0.1, 0.1),
-            at(-0.1, 0.1),
-            at(0.0, 1.6),
-            at(0.0, 1.5),
+            [0.2, 1.4], [-0.2, 1.4], [0.3, 1.1], [-0.3, 1.1], [0.3, 0.9], [-0.3, 0.9], [0.1, 0.9],
+            [-0.1, 0.9], [0.1, 0.5], [-0.1, 0.5], [0.1, 0.1], [-0.1, 0.1], [0.0, 1.6], [0.0, 1.5],
         ]
+        .map(|[x, y]| P3d::new(x, -y, 2.0))
     }
 
     #[test]
@@ -192,7 +177,7 @@ mod tests {
         let mut lost = ours;
         lost[4] += V3d::new(0.0, 0.35, 0.0);
         let error = FrameError::new(&lost, &offsets.convert(&truth));
-        assert!(error.is_bad() && error.joint == "left wrist");
+        assert!(error.is_bad(&PeopleSettings::default()) && error.joint == "left wrist");
     }
 
     #[test]
@@ -203,7 +188,7 @@ mod tests {
         let above = |p: &P3d| p.y < -0.6;
         assert!(FrameError::among(&ours, &truth, above).worst < 1e-9);
         let none = FrameError::among(&ours, &truth, |_| false);
-        assert!(none.mean.is_nan() && none.is_bad());
+        assert!(none.mean.is_nan() && none.is_bad(&PeopleSettings::default()));
     }
 
     #[test]

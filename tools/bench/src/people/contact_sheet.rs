@@ -1,10 +1,9 @@
 //! Contact sheets: shaded depth images with true and tracked joints, many in one picture.
 
 use super::common_joints::Points;
-use crate::EvaluateError;
+use crate::{EvaluateError, Sheet};
 use std::path::Path;
-use tryon_formats::image::write_png_rgb;
-use tryon_geometry::camera::{ColorImage, DepthImage, Intrinsics};
+use tryon_geometry::camera::{DepthImage, Intrinsics};
 use tryon_geometry::math::P3d;
 
 /// Size of one cell, pixels, and cells in a row.
@@ -16,28 +15,20 @@ const MOST: usize = 160;
 const TRUE: [u8; 3] = [60, 200, 60];
 const TRACKED: [u8; 3] = [230, 60, 40];
 /// Pairs of common joints that a bone connects.
+#[rustfmt::skip]
 const BONES: [[usize; 2]; 15] = [
-    [0, 1],
-    [0, 2],
-    [2, 4],
-    [1, 3],
-    [3, 5],
-    [6, 7],
-    [6, 8],
-    [8, 10],
-    [7, 9],
-    [9, 11],
-    [0, 6],
-    [1, 7],
-    [13, 12],
-    [0, 13],
-    [1, 13],
+    [0, 1], [0, 2], [2, 4], [1, 3], [3, 5], [6, 7], [6, 8], [8, 10],
+    [7, 9], [9, 11], [0, 6], [1, 7], [13, 12], [0, 13], [1, 13],
 ];
 
-/// Pictures in rows.
-#[derive(Clone, Debug, Default)]
-pub(super) struct ContactSheet {
-    cells: Vec<Vec<u8>>,
+/// Shaded depth images in rows.
+#[derive(Clone, Debug)]
+pub(super) struct ContactSheet(Sheet);
+
+impl Default for ContactSheet {
+    fn default() -> Self {
+        Self(Sheet::new(CELL, COLUMNS))
+    }
 }
 
 impl ContactSheet {
@@ -49,7 +40,7 @@ impl ContactSheet {
         truth: Option<&Points>,
         tracked: Option<&Points>,
     ) {
-        if self.cells.len() >= MOST {
+        if self.0.len() >= MOST {
             return;
         }
         let scale = f64::max(
@@ -69,36 +60,12 @@ impl ContactSheet {
                 }
             }
         }
-        self.cells.push(cell);
+        self.0.push(cell);
     }
 
-    /// Writes the sheet as `NAME.png` into `dir`; nothing without cells.
-    ///
-    /// # Errors
-    /// Names the file that cannot be written.
-    pub(super) fn write(&self, dir: &Path, name: &str) -> Result<(), EvaluateError> {
-        if self.cells.is_empty() {
-            return Ok(());
-        }
-        let fault = |why: String| EvaluateError::Scene {
-            scene: name.to_owned(),
-            why,
-        };
-        let columns = COLUMNS.min(self.cells.len());
-        let rows = self.cells.len().div_ceil(columns);
-        let [w, h] = CELL.map(|n| n as usize);
-        let mut data = vec![255u8; 3 * w * columns * h * rows];
-        for (k, cell) in self.cells.iter().enumerate() {
-            let (x, y) = (k % columns * w, k / columns * h);
-            for row in 0..h {
-                let at = 3 * ((y + row) * w * columns + x);
-                data[at..at + 3 * w].copy_from_slice(&cell[3 * row * w..3 * (row + 1) * w]);
-            }
-        }
-        let image = ColorImage::new((w * columns) as u32, (h * rows) as u32, data)
-            .map_err(|e| fault(e.to_string()))?;
-        std::fs::create_dir_all(dir).map_err(|e| fault(e.to_string()))?;
-        write_png_rgb(&dir.join(format!("{name}.png")), &image).map_err(|e| fault(e.to_string()))
+    /// Writes the sheet; nothing without cells.
+    pub(super) fn write(&self, path: &Path) -> Result<(), EvaluateError> {
+        self.0.write(path)
     }
 }
 
@@ -155,12 +122,13 @@ mod tests {
         let dir = tempfile::tempdir().expect("folder");
         let camera = Intrinsics::KINECT_V1;
         let mut sheet = ContactSheet::default();
-        sheet.write(dir.path(), "none").expect("nothing to do");
-        assert!(!dir.path().join("none.png").exists());
+        let path = dir.path().join("new/one.png");
+        sheet.write(&path).expect("nothing to do");
+        assert!(!path.exists());
         let far = [P3d::new(9e9, 0.0, 1.0); 14];
         let image = DepthImage::empty(640, 480);
         sheet.add(&camera, &image, Some(&far), Some(&[P3d::origin(); 14]));
-        sheet.write(dir.path(), "one").expect("written");
-        assert!(dir.path().join("one.png").exists());
+        sheet.write(&path).expect("written");
+        assert!(path.exists());
     }
 }

@@ -5,6 +5,7 @@ use super::common_joints::{Points, errors_mm};
 use super::contact_sheet::ContactSheet;
 use super::person::Person;
 use super::session::TrackedSession;
+use super::settings::PeopleSettings;
 use tryon_body::embedded;
 use tryon_geometry::camera::NoiseModel;
 use tryon_synth::{Posture, Room, Routine, Sequence, Setting};
@@ -14,8 +15,6 @@ pub(super) const CASES: usize = 24;
 /// Frames before the jump, and at most after it.
 const BEFORE: u64 = 30;
 const AFTER: u64 = 60;
-/// A joint within this distance is found, millimetres.
-const FOUND: f64 = 100.0;
 /// Number of the first person's random shape.
 const FIRST_PERSON: usize = 200;
 /// Shoulder, elbow and wrist of both arms among the common joints.
@@ -46,9 +45,9 @@ fn sequence(person: &Person, case: usize, posture: Posture) -> Sequence {
     Sequence::new(person.actor.clone(), setting)
 }
 
-/// Frames until all joints of each arm are within [`FOUND`]; [`AFTER`] when they never are.
-fn jump(case: usize, sheet: &mut ContactSheet) -> [f64; 2] {
-    let person = Person::random(FIRST_PERSON + case);
+/// Frames until all joints of each arm are found; [`AFTER`] when they never are.
+fn jump(settings: &PeopleSettings, case: usize, sheet: &mut ContactSheet) -> [f64; 2] {
+    let person = Person::random(FIRST_PERSON + case, settings);
     let [from, to] = JUMPS[case % JUMPS.len()].map(|p| sequence(&person, case, p));
     let mut session = TrackedSession::new(&embedded::template(), from.calibration());
     let set = from.setting().clone();
@@ -60,7 +59,7 @@ fn jump(case: usize, sheet: &mut ContactSheet) -> [f64; 2] {
     let truth = person.points(&truth);
     let is_found = |ours: &Points, arm: usize| {
         let off = errors_mm(ours, &truth);
-        ARMS[arm].iter().all(|&k| off[k] < FOUND)
+        ARMS[arm].iter().all(|&k| off[k] < settings.found_limb)
     };
     let mut found = [None; 2];
     for i in 0..AFTER {
@@ -80,18 +79,25 @@ fn jump(case: usize, sheet: &mut ContactSheet) -> [f64; 2] {
 }
 
 /// Measures the row on `cases`.
-pub(super) fn measure(cases: &[usize], sheet: &mut ContactSheet) -> Vec<Bar> {
+pub(super) fn measure(
+    settings: &PeopleSettings,
+    cases: &[usize],
+    sheet: &mut ContactSheet,
+) -> Vec<Bar> {
     let (mut times, mut named) = (Vec::new(), Vec::new());
     for &case in cases {
         let [from, to] = JUMPS[case % JUMPS.len()];
-        for (time, side) in jump(case, sheet).into_iter().zip(["left", "right"]) {
+        for (time, side) in jump(settings, case, sheet)
+            .into_iter()
+            .zip(["left", "right"])
+        {
             times.push(time);
             named.push((format!("case {case} {from:?}→{to:?} {side}"), time));
         }
     }
     let bar = |measure: &str, q: f64| {
         let measure = format!("frames until a lost arm is found, {measure}");
-        Bar::new("limb", measure, quantile(&times, q), times.len())
+        Bar::new(measure, quantile(&times, q), times.len())
     };
     vec![
         bar("median", 0.5),

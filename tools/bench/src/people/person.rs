@@ -1,6 +1,7 @@
 //! People of the bench: random shapes of the embedded body's space, and bodies outside it.
 
 use super::common_joints::{CommonJoints, Points};
+use super::settings::PeopleSettings;
 use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
 use std::sync::Arc;
@@ -18,17 +19,16 @@ pub(super) struct Person {
     common: CommonJoints,
 }
 
-/// Largest coefficient of a random shape, standard deviations.
-const LARGEST: f64 = 2.0;
 const SEED: u64 = 0x5eed_0001;
 
 impl Person {
     /// A person of the embedded body's shape space: normally distributed coefficients, sexes in turn.
-    pub(super) fn random(index: usize) -> Self {
+    pub(super) fn random(index: usize, settings: &PeopleSettings) -> Self {
+        let largest = settings.largest;
         let mut rng = rand_pcg::Pcg32::seed_from_u64(SEED + index as u64);
         let mut coefficient = || {
             let x: f64 = StandardNormal.sample(&mut rng);
-            x.clamp(-LARGEST, LARGEST)
+            x.clamp(-largest, largest)
         };
         let mut coefficients: Vec<f64> = DIRECTIONS.iter().map(|_| coefficient()).collect();
         if let Some(sex) = DIRECTIONS.iter().position(|d| *d == "sex") {
@@ -74,10 +74,12 @@ mod tests {
 
     #[test]
     fn random_people_differ_and_stay_the_same_from_run_to_run() {
-        let (a, b) = (Person::random(0), Person::random(1));
+        let settings = PeopleSettings::default();
+        let person = |index| Person::random(index, &settings);
+        let (a, b) = (person(0), person(1));
         assert_ne!(a.actor.shape, b.actor.shape);
-        assert_eq!(a.actor.shape, Person::random(0).actor.shape);
+        assert_eq!(a.actor.shape, person(0).actor.shape);
         let all = a.actor.shape.coefficients.iter();
-        assert!(all.clone().all(|c| c.abs() <= LARGEST) && all.len() == DIRECTIONS.len());
+        assert!(all.clone().all(|c| c.abs() <= settings.largest) && all.len() == DIRECTIONS.len());
     }
 }

@@ -1,31 +1,32 @@
 //! Extent of a run: rows, cases, data and pictures.
 
 use super::person::Person;
+use super::settings::PeopleSettings;
+use clap::Args;
 use std::path::PathBuf;
 
-/// Half of the cases that is measured.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum CaseSet {
-    /// Two thirds of the cases, for daily work.
-    #[default]
-    Seen,
-    /// The third that is kept apart (every index that leaves 2 when divided by 3): nothing is tuned on it.
-    Unseen,
-}
-
-/// Settings of the bench.
-#[derive(Clone, Debug, Default)]
+/// Extent of a run.
+#[derive(Args, Clone, Debug, Default)]
 pub struct PeoplePlan {
-    /// Folder with bodies, motions and recordings; rows that need it are skipped without it.
+    /// Folder with bodies, motions and recordings; without it their rows are skipped.
+    #[arg(long, value_name = "DIR")]
     pub data: Option<PathBuf>,
-    /// Cases that are measured; rows on recordings always use all of theirs.
-    pub cases: CaseSet,
-    /// A few cases of each row only.
-    pub quick: bool,
-    /// Names of the rows to run; empty for all.
+    /// Only these rows: unlike, shops, poses, sides, limb, stills, shared, uva.
+    #[arg(long, value_name = "NAME", value_delimiter = ',')]
     pub only: Vec<String>,
-    /// Folder for one contact sheet per row.
+    /// A fraction of the cases of each row: two minutes instead of many.
+    #[arg(long)]
+    pub quick: bool,
+    /// The third of the cases that is kept apart (every index that leaves 2 when divided by 3), instead of the other two thirds:
+    /// nothing is tuned on it.
+    #[arg(long)]
+    pub unseen: bool,
+    /// Folder for a contact sheet per row: depth with true (green) and tracked (red) joints.
+    #[arg(long, value_name = "DIR")]
     pub pictures: Option<PathBuf>,
+    /// Bounds and placements.
+    #[arg(skip)]
+    pub settings: PeopleSettings,
 }
 
 /// People of the rows `poses` and `sides`.
@@ -36,7 +37,7 @@ const QUICK: usize = 5;
 impl PeoplePlan {
     /// Indices of the cases to measure among `count`.
     pub(super) fn cases(&self, count: usize) -> Vec<usize> {
-        let is_wanted = |i: &usize| (i % 3 == 2) == (self.cases == CaseSet::Unseen);
+        let is_wanted = |i: &usize| (i % 3 == 2) == self.unseen;
         let all = (0..count).filter(is_wanted);
         if self.quick {
             all.step_by(QUICK).collect()
@@ -54,7 +55,9 @@ impl PeoplePlan {
             } else {
                 None
             };
-            other.cloned().unwrap_or_else(|| Person::random(i))
+            other
+                .cloned()
+                .unwrap_or_else(|| Person::random(i, &self.settings))
         };
         self.cases(PEOPLE).into_iter().map(person).collect()
     }
@@ -66,20 +69,17 @@ mod tests {
 
     #[test]
     fn seen_and_unseen_cases_are_all_cases_once() {
-        let plan = |cases| PeoplePlan {
-            cases,
+        let plan = |unseen, quick| PeoplePlan {
+            unseen,
+            quick,
             ..PeoplePlan::default()
         };
-        let mut all = plan(CaseSet::Seen).cases(20);
+        let mut all = plan(false, false).cases(20);
         assert_eq!(all.len(), 14);
-        all.extend(plan(CaseSet::Unseen).cases(20));
+        all.extend(plan(true, false).cases(20));
         all.sort_unstable();
         assert_eq!(all, (0..20).collect::<Vec<_>>());
-        assert!(plan(CaseSet::Unseen).cases(0).is_empty());
-        let quick = PeoplePlan {
-            quick: true,
-            ..PeoplePlan::default()
-        };
-        assert_eq!(quick.cases(20).len(), 3);
+        assert!(plan(true, false).cases(0).is_empty());
+        assert_eq!(plan(false, true).cases(20).len(), 3);
     }
 }

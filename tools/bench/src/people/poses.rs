@@ -5,7 +5,9 @@ use super::common_joints::{ConventionOffsets, FrameError, Points};
 use super::contact_sheet::ContactSheet;
 use super::person::Person;
 use super::session::TrackedSession;
+use super::settings::PeopleSettings;
 use rand::{Rng, SeedableRng};
+use std::f64::consts::PI;
 use tryon_body::embedded;
 use tryon_geometry::camera::{DepthImage, Intrinsics, NoiseModel};
 use tryon_geometry::math::P3d;
@@ -14,14 +16,6 @@ use tryon_tracking::Status;
 
 /// Frames until a person must be found.
 const FRAMES: u64 = 10;
-/// Found: mean joint error and greatest of the joints in view, millimetres.
-const FOUND_MEAN: f64 = 60.0;
-const FOUND_WORST: f64 = 200.0;
-/// Stands for the error of a lost person, millimetres: above every measured one.
-const LOST: f64 = 9999.0;
-/// Turn to either side, radians, and distances, metres.
-const TURN: f64 = 0.35;
-const AWAY: [f64; 2] = [2.1, 2.8];
 const SEED: u64 = 0x5eed_0002;
 
 /// Name, posture, turn (radians), and whether only head and trunk are in the picture.
@@ -30,12 +24,7 @@ const POSES: [(&str, Posture, f64, bool); 8] = [
     ("arms crossed", Posture::ArmsCrossed, 0.0, false),
     ("hands on hips", Posture::HandsOnHips, 0.0, false),
     ("overhead", Posture::Overhead, 0.0, false),
-    (
-        "from behind",
-        Posture::Standing,
-        std::f64::consts::PI,
-        false,
-    ),
+    ("from behind", Posture::Standing, PI, false),
     ("waist up", Posture::Standing, 0.0, true),
     ("crouching", Posture::Crouching, 0.0, false),
     ("one knee", Posture::OneKnee, 0.0, false),
@@ -54,14 +43,14 @@ struct Still {
 }
 
 /// Setting of case `pose` of person `index`: distance, turn and noise drawn from the case's numbers.
-fn setting(index: usize, pose: usize) -> Setting {
+fn setting(settings: &PeopleSettings, index: usize, pose: usize) -> Setting {
     let (_, posture, turn, waist_up) = *POSES.get(pose).unwrap_or(&SEATED);
     let mut rng = rand_pcg::Pcg32::seed_from_u64(SEED + (index * POSES.len() + pose) as u64);
-    let turn = turn + rng.random_range(-TURN..TURN);
+    let turn = turn + rng.random_range(-settings.turn..settings.turn);
     let away = if waist_up {
         1.25
     } else {
-        rng.random_range(AWAY[0]..AWAY[1])
+        rng.random_range(settings.away[0]..settings.away[1])
     };
     let (height, down) = if waist_up { (1.35, 0.0) } else { (1.1, 4.0) };
     Setting {
@@ -104,15 +93,19 @@ fn is_in_view(camera: &Intrinsics, p: &P3d) -> bool {
 }
 
 /// Measures the row on `people`.
-pub(super) fn measure(people: &[Person], sheet: &mut ContactSheet) -> Vec<Bar> {
+pub(super) fn measure(
+    settings: &PeopleSettings,
+    people: &[Person],
+    sheet: &mut ContactSheet,
+) -> Vec<Bar> {
     let mut hits: [Vec<bool>; POSES.len()] = Default::default();
     let mut misses: [Vec<(String, f64)>; POSES.len()] = Default::default();
     let (mut seated, mut others) = (Vec::new(), Vec::new());
     for (index, person) in people.iter().enumerate() {
-        let status = still(person, setting(index, POSES.len())).status;
+        let status = still(person, setting(settings, index, POSES.len())).status;
         seated.push((person.name.clone(), status));
         let stills: Vec<Still> = (0..POSES.len())
-            .map(|k| still(person, setting(index, k)))
+            .map(|k| still(person, setting(settings, index, k)))
             .collect();
         let offsets = offsets(person, &stills);
         for (k, still) in stills.iter().enumerate() {
@@ -123,27 +116,26 @@ pub(super) fn measure(people: &[Person], sheet: &mut ContactSheet) -> Vec<Bar> {
             let error = still
                 .found
                 .map(|f| FrameError::among(&f, &truth, |p| is_in_view(&camera, p)));
-            let is_found = error.is_some_and(|e| e.mean < FOUND_MEAN && e.worst < FOUND_WORST);
+            let is_found = error
+                .is_some_and(|e| e.mean < settings.found_mean && e.worst < settings.found_worst);
             hits[k].push(is_found);
             others.push((format!("{} {}", person.name, POSES[k].0), still.status));
             if !is_found {
                 let name = error.map_or("lost".to_owned(), |e| e.joint.to_owned());
-                let worst = error.map_or(LOST, |e| e.worst);
+                let worst = error.map_or(settings.lost, |e| e.worst);
                 misses[k].push((format!("{} ({name})", person.name), worst));
             }
             sheet.add(&camera, &still.depth, Some(&truth), still.found.as_ref());
         }
     }
     let all = Bar::new(
-        "poses",
         "found, all poses [%]",
         percent(hits.iter().flatten().copied()),
         hits.iter().map(Vec::len).sum(),
     );
     let each = POSES.iter().zip(hits).zip(misses).map(|((p, h), m)| {
         let cases = h.len();
-        Bar::new("poses", format!("found, {} [%]", p.0), percent(h), cases)
-            .worst(greatest(m, " mm"))
+        Bar::new(format!("found, {} [%]", p.0), percent(h), cases).worst(greatest(m, " mm"))
     });
     let ends = [
         seat_bar("said to sit, who sits [%]", &seated, true),
@@ -158,7 +150,7 @@ fn seat_bar(measure: &str, cases: &[(String, Status)], expected: bool) -> Bar {
     let wrong = cases.iter().filter(|(_, status)| sits(status) != expected);
     let names = wrong.map(|(name, status)| format!("{name} ({status:?})"));
     let share = percent(cases.iter().map(|(_, status)| sits(status)));
-    Bar::new("poses", measure, share, cases.len()).worst(names.collect())
+    Bar::new(measure, share, cases.len()).worst(names.collect())
 }
 
 /// Offsets of a foreign skeleton: the median over this person's live poses.

@@ -1,8 +1,7 @@
-//! Rows `stills`, `shared` and `uva`: recordings with published or known truth.
+//! Rows `shared` and `uva`: recordings with published or known truth.
 
 use super::bars::{Bar, greatest, quantile};
 use super::session::{FRAME_NS, TrackedSession};
-use crate::stills::stills as start_on_stills;
 use crate::tracking::{follow, mean};
 use crate::{DepthScene, EvaluateError, scenes};
 use nalgebra::{Matrix3, Rotation3};
@@ -13,50 +12,20 @@ use tryon_geometry::math::V3d;
 use tryon_tracking::TrackerConfig;
 
 /// Folders below the data that the rows read.
-pub(super) const STILLS: &str = "rgbd/itop_stills";
 pub(super) const SHARED: &str = "sequences";
 pub(super) const TURN: &str = "rgbd/uva_turn";
-
-/// Share of ITOP's joints within 10 cm, one picture each.
-pub(super) fn stills(data: &Path) -> Result<Vec<Bar>, EvaluateError> {
-    let template = embedded::template();
-    let config = TrackerConfig::default();
-    let folder = data.join(STILLS);
-    let mut missed = Vec::new();
-    let outcome = start_on_stills(
-        &template,
-        &config,
-        &folder,
-        1,
-        |frame, _, _, _, _, share| {
-            missed.push((format!("still {frame}"), 100.0 * (1.0 - share)));
-        },
-    )?;
-    let bar = Bar::new(
-        "stills",
-        "ITOP joints within 10 cm, one picture each [%]",
-        100.0 * mean(&outcome.within),
-        outcome.within.len(),
-    );
-    Ok(vec![bar.worst(greatest(missed, " % missed"))])
-}
 
 /// Mean joint error of each shared sequence, tracked with the template of its bodies.
 pub(super) fn shared(data: &Path, frames: usize) -> Result<Vec<Bar>, EvaluateError> {
     let template = scenes::subject(data, "template")?;
     let mut bars = Vec::new();
-    for name in [
-        "charleston_m_heavy_tof_room",
-        "jacks_f_avg_kinect1_room",
-        "sword_m_tall_tof_noroom_upper",
-    ] {
-        let mut scene = DepthScene::open(&data.join(SHARED).join(name))?;
+    for (name, _) in scenes::SHARED {
+        let mut scene = scenes::scene(data, name)?;
         scene.frames.truncate(frames);
         let config = TrackerConfig::default();
         let outcome = follow(&template, &config, &scene, |_, _, _, _, _| {});
         let joints = scene.joint_names.iter().cloned();
         let bar = Bar::new(
-            "shared",
             format!("{name}, mean joint error [mm]"),
             mean(&outcome.joints_mm),
             outcome.joints_mm.len(),
@@ -88,10 +57,7 @@ fn wrapped(angle: f64) -> f64 {
 /// First live frame and yaw error of the torso of a man who turns about himself, at 15 and at 30 frames a second.
 pub(super) fn turn(data: &Path) -> Result<Vec<Bar>, EvaluateError> {
     let folder = data.join(TURN);
-    let fault = |why: String| EvaluateError::Scene {
-        scene: TURN.to_owned(),
-        why,
-    };
+    let fault = |why: String| EvaluateError::new(TURN, why);
     let scene = DepthScene::open(&folder)?;
     let text =
         std::fs::read_to_string(folder.join("poses.json")).map_err(|e| fault(e.to_string()))?;
@@ -142,16 +108,14 @@ fn turn_at(
     let found = first.map_or(f64::NAN, |f| f.0 as f64);
     let n = scene.frames.len();
     vec![
-        Bar::new("uva", format!("first live frame at {rate}/s"), found, n),
+        Bar::new(format!("first live frame at {rate}/s"), found, n),
         Bar::new(
-            "uva",
             format!("torso yaw error at {rate}/s, p95 [°]"),
             quantile(&errors, 0.95),
             errors.len(),
         )
         .worst(greatest(named, "°")),
         Bar::new(
-            "uva",
             format!("frames lost after the first live one at {rate}/s"),
             lost as f64,
             n,

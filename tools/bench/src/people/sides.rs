@@ -5,6 +5,7 @@ use super::common_joints::heading_error;
 use super::contact_sheet::ContactSheet;
 use super::person::Person;
 use super::session::TrackedSession;
+use super::settings::PeopleSettings;
 use crate::tracking::median;
 use std::f64::consts::{FRAC_PI_4, TAU};
 use tryon_body::embedded;
@@ -19,8 +20,6 @@ use tryon_synth::{Posture, Room, Routine, Sequence, Setting};
 const SIDES: usize = 8;
 /// Frames until size and shape no longer change, with a margin.
 const FRAMES: u64 = 72;
-/// Stands for the heading of a lost person, degrees: above every measured one.
-const LOST: f64 = 999.0;
 /// Garment whose size is suggested.
 const GARMENT: &str = "tshirt";
 
@@ -74,7 +73,11 @@ fn side(person: &Person, setting: Setting, sheet: &mut ContactSheet) -> SideView
 }
 
 /// Measures the row on `people`.
-pub(super) fn measure(people: &[Person], sheet: &mut ContactSheet) -> Vec<Bar> {
+pub(super) fn measure(
+    settings: &PeopleSettings,
+    people: &[Person],
+    sheet: &mut ContactSheet,
+) -> Vec<Bar> {
     let (mut right, mut wrong, mut same) = (Vec::new(), Vec::new(), Vec::new());
     let (mut differing, mut spread) = (Vec::new(), Vec::new());
     for (index, person) in people.iter().enumerate() {
@@ -88,7 +91,7 @@ pub(super) fn measure(people: &[Person], sheet: &mut ContactSheet) -> Vec<Bar> {
                 let off = if s.is_live {
                     s.heading.to_degrees()
                 } else {
-                    LOST
+                    settings.lost_heading
                 };
                 wrong.push((format!("{} from {}°", person.name, 45 * k), off));
             }
@@ -107,17 +110,14 @@ pub(super) fn measure(people: &[Person], sheet: &mut ContactSheet) -> Vec<Bar> {
     }
     let (sides, count) = (right.len(), people.len());
     vec![
-        Bar::new("sides", "facing right, live [%]", percent(right), sides)
-            .worst(greatest(wrong, "°")),
+        Bar::new("facing right, live [%]", percent(right), sides).worst(greatest(wrong, "°")),
         Bar::new(
-            "sides",
             "same T-shirt size from all sides [% of people]",
             percent(same),
             count,
         )
         .worst(greatest(differing, " mm of chest")),
         Bar::new(
-            "sides",
             "range of the chest girth over the sides, median [mm]",
             median(&spread),
             count,

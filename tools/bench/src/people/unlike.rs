@@ -4,7 +4,9 @@ use super::bars::{Bar, greatest, percent};
 use super::common_joints::{ConventionOffsets, FrameError, Points};
 use super::contact_sheet::ContactSheet;
 use super::person::Person;
+use super::plan::PeoplePlan;
 use super::session::TrackedSession;
+use super::settings::PeopleSettings;
 use crate::EvaluateError;
 use crate::tracking::mean;
 use std::path::Path;
@@ -29,12 +31,8 @@ const NOISES: [(&str, NoiseModel); 2] = [
 /// First frame (one second of blending from the calibration pose, then the clip) and number of frames.
 const FIRST: u64 = 30;
 const FRAMES: u64 = 90;
-/// Distance of the start, metres.
-const AWAY: f64 = 2.7;
 /// Frames between pictures of a contact sheet.
 const PICTURE_INTERVAL: u64 = 40;
-/// A frame above this mean error is far off, millimetres.
-const FAR: f64 = 40.0;
 
 /// Live frames of one sequence, ours and true.
 struct TrackedClip {
@@ -42,10 +40,10 @@ struct TrackedClip {
     pairs: Vec<(Points, Points)>,
 }
 
-fn setting(noise: NoiseModel) -> Setting {
+fn setting(settings: &PeopleSettings, noise: NoiseModel) -> Setting {
     Setting {
         world_from_camera: Setting::tilted(1.1, 4.0, 0.0),
-        home: P3d::new(0.0, 0.0, -AWAY),
+        home: P3d::new(0.0, 0.0, -settings.unlike_away),
         room: Some(Room {
             back_z: -5.0,
             left_x: -2.6,
@@ -76,7 +74,7 @@ fn follow(person: &Person, sequence: &Sequence, sheet: &mut ContactSheet) -> Vec
 }
 
 /// Adds the standing body from the front and from the side, without noise, to a sheet.
-fn show(person: &Person, sheet: &mut ContactSheet) {
+fn show(settings: &PeopleSettings, person: &Person, sheet: &mut ContactSheet) {
     for turn in [0.0, 0.5 * std::f64::consts::PI] {
         let setting = Setting {
             world_from_camera: Setting::tilted(1.0, 0.0, 0.0),
@@ -84,7 +82,7 @@ fn show(person: &Person, sheet: &mut ContactSheet) {
             room: None,
             noise: NoiseModel::None,
             routine: Routine::Hold(Posture::Standing),
-            ..setting(NoiseModel::None)
+            ..setting(settings, NoiseModel::None)
         };
         let sequence = Sequence::new(person.actor.clone(), setting);
         let (frame, truth) = sequence.frame(0);
@@ -102,10 +100,7 @@ fn clips(
     let mut out = Vec::new();
     for (k, (clip, file)) in CLIPS.iter().enumerate() {
         let motion = read_motion(&data.join(MOTIONS).join(file));
-        let motion = motion.map_err(|e| EvaluateError::Scene {
-            scene: (*clip).to_owned(),
-            why: e.to_string(),
-        })?;
+        let motion = motion.map_err(|e| EvaluateError::new(clip, e))?;
         for (n, (noise, model)) in NOISES.iter().enumerate() {
             if !is_quick || n == k % 2 {
                 out.push((
@@ -121,24 +116,22 @@ fn clips(
 
 /// Measures the row on `people`.
 pub(super) fn measure(
+    plan: &PeoplePlan,
     data: &Path,
     people: &[Person],
-    is_quick: bool,
     sheet: &mut ContactSheet,
 ) -> Result<Vec<Bar>, EvaluateError> {
-    let clips = clips(data, is_quick)?;
+    let settings = &plan.settings;
+    let clips = clips(data, plan.quick)?;
     let mut all = Vec::new();
     let mut bars = Vec::new();
-    people.iter().for_each(|p| show(p, sheet));
+    people.iter().for_each(|p| show(settings, p, sheet));
     for person in people {
         let mut tracked = Vec::new();
         for (name, clip, noise) in &clips {
-            let sequence = Sequence::new(person.actor.clone(), setting(*noise))
+            let sequence = Sequence::new(person.actor.clone(), setting(settings, *noise))
                 .with_clip(clip.clone())
-                .map_err(|e| EvaluateError::Scene {
-                    scene: name.clone(),
-                    why: e.to_string(),
-                })?;
+                .map_err(|e| EvaluateError::new(name, e))?;
             tracked.push(TrackedClip {
                 name: format!("{} {name}", person.name),
                 pairs: follow(person, &sequence, sheet),
@@ -155,10 +148,10 @@ pub(super) fn measure(
             .iter()
             .map(|t| (t.name.clone(), errors(t)))
             .collect();
-        bars.extend(person_bars(&person.name, &of_person));
+        bars.push(person_bar(&person.name, &of_person));
         all.extend(of_person);
     }
-    let mut out = summary(&all);
+    let mut out = summary(settings, &all);
     out.extend(bars);
     Ok(out)
 }
@@ -168,18 +161,18 @@ fn means(frames: &[FrameError]) -> f64 {
 }
 
 /// The bars over all people.
-fn summary(clips: &[(String, Vec<FrameError>)]) -> Vec<Bar> {
+fn summary(settings: &PeopleSettings, clips: &[(String, Vec<FrameError>)]) -> Vec<Bar> {
     let frames: Vec<FrameError> = clips.iter().flat_map(|c| c.1.iter().copied()).collect();
     let n = frames.len();
     let of_clips = |f: &dyn Fn(&[FrameError]) -> f64| {
         let values = clips.iter().map(|(name, e)| (name.clone(), f(e)));
         values.collect::<Vec<_>>()
     };
-    let far = |e: &[FrameError]| percent(e.iter().map(|e| e.mean > FAR));
-    let bad = |e: &[FrameError]| percent(e.iter().map(FrameError::is_bad));
+    let far = |e: &[FrameError]| percent(e.iter().map(|e| e.mean > settings.far));
+    let bad = |e: &[FrameError]| percent(e.iter().map(|e| e.is_bad(settings)));
     let live = |e: &[FrameError]| 100.0 * e.len() as f64 / FRAMES as f64;
     let lost = of_clips(&|e| 100.0 - live(e));
-    let bar = |measure: &str, value: f64| Bar::new("unlike", measure, value, n);
+    let bar = |measure: &str, value: f64| Bar::new(measure, value, n);
     vec![
         bar("joint error, mean [mm]", means(&frames)).worst(greatest(of_clips(&means), " mm")),
         bar("frames over 40 mm [%]", far(&frames)).worst(greatest(of_clips(&far), " %")),
@@ -192,7 +185,7 @@ fn summary(clips: &[(String, Vec<FrameError>)]) -> Vec<Bar> {
 }
 
 /// The mean error of one person, with its worst joints.
-fn person_bars(name: &str, clips: &[(String, Vec<FrameError>)]) -> Vec<Bar> {
+fn person_bar(name: &str, clips: &[(String, Vec<FrameError>)]) -> Bar {
     let frames: Vec<FrameError> = clips.iter().flat_map(|c| c.1.iter().copied()).collect();
     let worst = clips.iter().filter_map(|(clip, errors)| {
         let e = errors.iter().max_by(|a, b| a.worst.total_cmp(&b.worst))?;
@@ -200,10 +193,9 @@ fn person_bars(name: &str, clips: &[(String, Vec<FrameError>)]) -> Vec<Bar> {
         Some((format!("{clip} {}", e.joint), e.worst))
     });
     let bar = Bar::new(
-        "unlike",
         format!("{name}: joint error, mean [mm]"),
         means(&frames),
         frames.len(),
     );
-    vec![bar.worst(greatest(worst.collect(), " mm"))]
+    bar.worst(greatest(worst.collect(), " mm"))
 }

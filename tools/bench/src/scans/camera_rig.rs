@@ -4,6 +4,7 @@ use super::depth_camera::{Backdrop, CleanView, DepthCamera};
 use super::paint::PaintedSurface;
 use super::points::{STRAY_LABEL, ScanPoints};
 use super::random::{ScanSeed, gauss};
+use super::settings::ScanSettings;
 use nalgebra::{Translation3, UnitQuaternion};
 use rand::Rng;
 use rand::seq::index::sample;
@@ -13,14 +14,6 @@ use std::f64::consts::TAU;
 use tryon_geometry::camera::NoiseModel;
 use tryon_geometry::math::{P3, Rigid, V3, V3d, World};
 
-/// Difference of depths between neighbouring pixels from which they lie at a silhouette (m).
-const SILHOUETTE: f32 = 0.06;
-/// Depth to the background beside a silhouette that has none (m).
-const BACKGROUND: f32 = 0.4;
-/// Height about which the poses of cameras err: the middle of the subject (m).
-const MIDDLE: f32 = 0.9;
-/// Distance that a flying pixel needs to be no point of the subject (m).
-const FLYING: f32 = 0.02;
 /// Stages with random numbers of their own.
 const POSES: u64 = 21;
 const SILHOUETTES: u64 = 22;
@@ -82,6 +75,7 @@ impl CameraRig {
         seed: ScanSeed,
     ) -> ScanPoints {
         let center = painted.surface.center();
+        let settings = &painted.surface.settings;
         let mut poses = seed.stage(POSES);
         let mut flights = seed.stage(SILHOUETTES);
         let mut exposures = seed.stage(EXPOSURES);
@@ -92,9 +86,9 @@ impl CameraRig {
                 [(); 3].map(|()| 1.0 + self.white_balance * (2.0 * poses.random::<f32>() - 1.0));
             let exposure = 1.0 + self.exposure * (2.0 * exposures.random::<f32>() - 1.0);
             let gains = gains.map(|g| g * exposure);
-            let error = self.error(center, &mut poses);
+            let error = self.error(settings, center, &mut poses);
             let mut clean = camera.view(painted, Backdrop::Floor);
-            self.fly(&mut clean, camera.intrinsics.width as usize, &mut flights);
+            self.fly(settings, &mut clean, &mut flights);
             let number = seed.scan * self.cameras as u64 + k as u64;
             let depth = (camera.noise).apply(&camera.intrinsics, &clean.depth, seed.scene, number);
             let world = error * camera.world_from_camera;
@@ -160,27 +154,30 @@ impl CameraRig {
     }
 
     /// Motion of a camera's points by its wrong calibration.
-    fn error(&self, center: P3, rng: &mut Pcg64) -> Rigid<World, World> {
+    fn error(&self, settings: &ScanSettings, center: P3, rng: &mut Pcg64) -> Rigid<World, World> {
         let mut direction = || {
             let v = V3::from_fn(|_, _| gauss(rng, 1.0)).cast::<f64>();
             v.try_normalize(0.0).unwrap_or_else(V3d::x)
         };
         let (shift, axis) = (direction() * self.shift, direction() * self.turn);
-        let middle = (center.coords + V3::y() * MIDDLE).cast::<f64>();
+        let middle = (center.coords + V3::y() * settings.middle).cast::<f64>();
         let turn = UnitQuaternion::new(axis);
         Rigid::new(Translation3::from(middle + shift) * turn * Translation3::from(-middle))
     }
 
     /// Moves pixels at silhouettes between the surfaces before and behind them.
-    fn fly(&self, view: &mut CleanView, width: usize, rng: &mut Pcg64) {
+    fn fly(&self, settings: &ScanSettings, view: &mut CleanView, rng: &mut Pcg64) {
+        let width = view.width;
         let before = view.depth.clone();
         for (i, &z) in before.iter().enumerate().filter(|(_, z)| z.is_finite()) {
             let beside = [i.wrapping_sub(1), i + 1, i.wrapping_sub(width), i + width];
             let far = beside.iter().filter_map(|j| before.get(*j));
-            let far = far.map(|far| far.min(z + BACKGROUND)).fold(z, f32::max);
-            if far - z > SILHOUETTE && rng.random::<f64>() < self.flying {
+            let far = far
+                .map(|far| far.min(z + settings.background))
+                .fold(z, f32::max);
+            if far - z > settings.silhouette && rng.random::<f64>() < self.flying {
                 view.depth[i] = z + (far - z) * rng.random::<f32>();
-                if view.depth[i] - z > FLYING {
+                if view.depth[i] - z > settings.flying_gap {
                     view.labels[i] = STRAY_LABEL;
                 }
             }

@@ -1,5 +1,6 @@
 //! Garments put on a subject and simulated from pose to pose.
 
+use super::settings::ScanSettings;
 use super::skinned::{BoundGarment, SkinnedGarment};
 use tryon::mirror::Choice;
 use tryon_body::measure::measure;
@@ -7,14 +8,8 @@ use tryon_body::{BoneTransforms, Pose, RestBody, Template, skin};
 use tryon_cloth::{Input, Workspace, step};
 use tryon_dressing::{DressOptions, Dressed, GarmentSource, dress_all};
 use tryon_garment::GarmentMesh;
-use tryon_geometry::math::{P3, P3d, World};
+use tryon_geometry::math::{P3, World};
 use tryon_geometry::par::Par;
-
-/// Steps at the first pose before the first scan: dressed cloth still sways.
-const SETTLING_STEPS: usize = 12;
-
-/// Least distance of a skinned garment from the skin or the skinned garment below it, at rest (m).
-const SKINNED_GAP: f32 = 3e-3;
 
 /// Garment of a scanned outfit.
 #[derive(Clone, Debug)]
@@ -44,6 +39,7 @@ pub(super) struct ScanWardrobe<'a> {
     pub(super) edge: f64,
     /// Garments that move with the skin below them.
     pub(super) skinned: &'a [SkinnedGarment],
+    pub(super) settings: &'a ScanSettings,
 }
 
 /// Body and cloth in one pose of a motion.
@@ -69,7 +65,7 @@ impl<'a> ClothRun<'a> {
         wardrobe: &ScanWardrobe<'_>,
         dt: f64,
     ) -> Result<Self, String> {
-        let gaps = (1..).map(|layer: u16| SKINNED_GAP * f32::from(layer));
+        let gaps = (1..).map(|layer: u16| wardrobe.settings.skinned_gap * f32::from(layer));
         let bound = wardrobe.skinned.iter().zip(gaps);
         let bound = bound.map(|(g, gap)| g.bind(template, rest, gap));
         let mut run = Self {
@@ -84,7 +80,7 @@ impl<'a> ClothRun<'a> {
         };
         if !wardrobe.patterns.is_empty() {
             run.dressed = Some(put_on(template, rest, pose, wardrobe)?);
-            for _ in 0..SETTLING_STEPS {
+            for _ in 0..wardrobe.settings.settling_steps {
                 run.step(pose, dt)?;
             }
             run.strain = 0.0;
@@ -96,13 +92,8 @@ impl<'a> ClothRun<'a> {
     /// Moves the body to a pose and the cloth by `dt` (s).
     pub(super) fn step(&mut self, pose: &Pose<World>, dt: f64) -> Result<(), String> {
         pose.bones(self.template.skeleton(), self.rest, &mut self.bones);
-        skin(
-            Par::Rayon,
-            &self.rest.vertices,
-            self.template.weights(),
-            &self.bones,
-            &mut self.body,
-        );
+        let (rest, weights) = (&self.rest.vertices, self.template.weights());
+        skin(Par::Rayon, rest, weights, &self.bones, &mut self.body);
         for garment in &mut self.skinned {
             garment.pose(&self.bones);
         }
@@ -126,11 +117,6 @@ impl<'a> ClothRun<'a> {
             .as_ref()
             .map(|d| d.state.collision_body().vertices());
         collision.unwrap_or(&self.body)
-    }
-
-    /// Joints of the posed skeleton, world (m).
-    pub(super) fn joints(&self) -> &[P3d] {
-        &self.bones.joints
     }
 
     /// Garments with the positions of their simulation vertices, innermost first; skinned ones lie over simulated ones.

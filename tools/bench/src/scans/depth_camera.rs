@@ -1,24 +1,15 @@
 //! One colour and depth camera before the subject: frames as a sensor delivers them, with the label of each pixel.
 
 use super::STRAY_LABEL;
-use super::paint::{PaintedSurface, shade};
+use super::paint::{PaintedSurface, tinted_shade};
+use super::random::ScanSeed;
+use super::settings::ScanSettings;
 use super::surface::SceneSurface;
-use tryon_geometry::camera::{
-    Calibration, ColorImage, DepthImage, Intrinsics, NoiseModel, RgbdFrame,
-};
+use tryon_geometry::camera::{Calibration, ColorImage, Intrinsics, NoiseModel, RgbdFrame};
 use tryon_geometry::math::{Camera, P3, P3d, Rigid, V3d, World};
 use tryon_geometry::mesh::Face;
 use tryon_geometry::par::Par;
 use tryon_geometry::raster::{Options, View, VisibilityBuffer, barycentrics, rasterise_with};
-
-/// Half the side of the floor and of the wall (m).
-const ROOM: f32 = 4.0;
-/// Distance of the wall behind the subject (m).
-const WALL: f32 = -1.6;
-/// Colours of floor and wall, sRGB.
-const ROOM_COLORS: [[u8; 3]; 2] = [[150, 112, 76], [196, 194, 188]];
-/// Near plane (m).
-const NEAR: f32 = 0.3;
 
 /// Depth camera with registered colour, before a subject at the origin of the world, on a floor and before a wall.
 #[derive(Clone, Debug, PartialEq)]
@@ -65,6 +56,8 @@ pub(super) enum Backdrop {
 /// Images without noise. Shapes: `[pixels]`.
 #[derive(Clone, Debug)]
 pub(super) struct CleanView {
+    /// Pixels in a row.
+    pub(super) width: usize,
     /// Depth (m); infinite where nothing is seen.
     pub(super) depth: Vec<f32>,
     /// Colours, sRGB.
@@ -79,26 +72,24 @@ impl DepthCamera {
         Calibration::registered(self.intrinsics)
     }
 
-    /// Frame number `index` of a painted surface, `rate` a second, and the label of each pixel.
+    /// Frame of a painted surface, `rate` a second.
     pub(super) fn shoot(
         &self,
         painted: PaintedSurface<'_>,
-        index: usize,
-        seed: u64,
+        seed: ScanSeed,
         rate: f64,
-    ) -> (RgbdFrame, Vec<u8>) {
+    ) -> RgbdFrame {
         let clean = self.view(painted, Backdrop::Wall);
-        let depth: DepthImage =
-            (self.noise).apply(&self.intrinsics, &clean.depth, seed, index as u64);
+        let noise = self.noise;
+        let depth = noise.apply(&self.intrinsics, &clean.depth, seed.scene, seed.scan);
         let Intrinsics { width, height, .. } = self.intrinsics;
         let color = ColorImage::new(width, height, clean.color.concat());
-        let frame = RgbdFrame {
-            sequence: index as u64,
-            time_ns: (index as f64 / rate * 1e9) as u64,
+        RgbdFrame {
+            sequence: seed.scan,
+            time_ns: (seed.scan as f64 / rate * 1e9) as u64,
             depth,
             color: color.ok(),
-        };
-        (frame, clean.labels)
+        }
     }
 
     /// A painted surface in a room as a camera without noise sees it.
@@ -106,11 +97,11 @@ impl DepthCamera {
         let surface = painted.surface;
         let view = View::Perspective {
             camera: self.intrinsics,
-            near: NEAR,
+            near: surface.settings.near,
         };
         let mut drawn = surface.drawn.clone();
         let mut faces = surface.faces.clone();
-        add_room(&mut drawn, &mut faces, backdrop);
+        add_room(&surface.settings, &mut drawn, &mut faces, backdrop);
         let mut local = Vec::new();
         (self.world_from_camera.inverse()).points_f32(&drawn, &mut local);
         let mut buffer = VisibilityBuffer::default();
@@ -134,13 +125,14 @@ impl DepthCamera {
                 }
                 Some(_) => {
                     let wall = *face as usize >= surface.faces.len() + 2;
-                    (STRAY_LABEL, ROOM_COLORS[usize::from(wall)])
+                    (STRAY_LABEL, surface.settings.room_colors[usize::from(wall)])
                 }
                 None => (STRAY_LABEL, [0; 3]),
             }
         };
         let (labels, color) = buffer.face.iter().enumerate().map(seen).unzip();
         CleanView {
+            width: width as usize,
             depth: buffer.depth,
             color,
             labels,
@@ -160,31 +152,31 @@ fn lit(painted: PaintedSurface<'_>, face: &Face, weights: [f32; 3], eye: &P3) ->
     };
     let normal = normal.try_normalize(f32::MIN_POSITIVE).unwrap_or_default();
     let material = SceneSurface::blend(&surface.material, face, weights);
-    let light = shade(&normal, 1.0);
+    let light = tinted_shade(&surface.settings, &normal, 1.0, 0.0).y;
     let color = paint.color(surface.labels[face[0] as usize], &material);
     color.map(|c| (c * light).clamp(0.0, 255.0) as u8)
 }
 
 /// Adds two triangles of floor, then two of wall if there is one.
-fn add_room(vertices: &mut Vec<P3>, faces: &mut Vec<Face>, backdrop: Backdrop) {
+fn add_room(
+    settings: &ScanSettings,
+    vertices: &mut Vec<P3>,
+    faces: &mut Vec<Face>,
+    backdrop: Backdrop,
+) {
+    let room = settings.room;
     let (back, count) = match backdrop {
-        Backdrop::Wall => (WALL, 2),
-        Backdrop::Floor => (-ROOM, 1),
+        Backdrop::Wall => (settings.wall, 2),
+        Backdrop::Floor => (-room, 1),
     };
-    let quads = [
+    let quads = [[0.0, room], [room, back]].map(|[y, z]| {
         [
-            [-ROOM, 0.0, back],
-            [ROOM, 0.0, back],
-            [ROOM, 0.0, ROOM],
-            [-ROOM, 0.0, ROOM],
-        ],
-        [
-            [-ROOM, 0.0, back],
-            [ROOM, 0.0, back],
-            [ROOM, ROOM, back],
-            [-ROOM, ROOM, back],
-        ],
-    ];
+            [-room, 0.0, back],
+            [room, 0.0, back],
+            [room, y, z],
+            [-room, y, z],
+        ]
+    });
     for quad in &quads[..count] {
         let first = vertices.len() as u32;
         vertices.extend(quad.map(P3::from));

@@ -2,26 +2,9 @@
 //!
 //! A [`ScanScene`] dresses a body, simulates its garments over a motion and scans the visible surface with a ring of
 //! virtual cameras. Scans are functions of the scene: the same bits every time.
-//!
-//! ```no_run
-//! use tryon_bench::scans::{ScanScene, write_scan_folder};
-//!
-//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
-//! let scene = ScanScene {
-//!     scans: 3,
-//!     ..ScanScene::library(&["trousers", "tshirt"])?
-//! };
-//! for scan in scene.scans()? {
-//!     assert_eq!(scan.points.len(), scan.labels.len());
-//! }
-//! write_scan_folder("scans".as_ref(), &scene)?;
-//! # Ok(())
-//! # }
-//! ```
 
 mod camera_rig;
 mod cloth_run;
-mod defects;
 mod depth_camera;
 mod film;
 mod motion;
@@ -31,6 +14,7 @@ mod random;
 mod sampling;
 mod scanner;
 pub(crate) mod scene;
+mod settings;
 mod skinned;
 mod surface;
 #[cfg(test)]
@@ -40,7 +24,6 @@ mod write;
 
 pub use camera_rig::CameraRig;
 pub use cloth_run::ScanGarment;
-pub use defects::ScanDefects;
 pub use depth_camera::DepthCamera;
 pub use film::FilmedFrame;
 pub use motion::ScanMotion;
@@ -48,5 +31,6 @@ pub use paint::ScanPalette;
 pub use points::{SKIN_LABEL, STRAY_LABEL};
 pub use scanner::ScannerSetting;
 pub use scene::{ScanScene, TrueGarment, TrueScan};
+pub use settings::ScanSettings;
 pub use skinned::{GarmentParts, SkinnedGarment};
 pub use write::write_scan_folder;

@@ -6,9 +6,6 @@ use tryon_formats::MotionClip;
 use tryon_geometry::math::{P3d, Rigid, V3d, World};
 use tryon_synth::{Actor, ClipError, Routine, Sequence, Setting};
 
-/// Time before a clip plays in a [`Sequence`]: calibration pose and blend (s).
-const CLIP_LEAD: f64 = 2.0;
-
 /// Motion of a scanned subject.
 #[derive(Clone, Debug, PartialEq)]
 pub enum ScanMotion {
@@ -18,13 +15,6 @@ pub enum ScanMotion {
         routine: Routine,
         /// Time in the routine at the first scan (s).
         start: f64,
-    },
-    /// Turn about the vertical in the posture of a routine at its start.
-    TurnOnSpot {
-        /// Routine.
-        routine: Routine,
-        /// Angular velocity, counter-clockwise seen from above (rad/s).
-        speed: f64,
     },
     /// Turn about the vertical while a routine plays: limbs and trunk move too.
     Turn {
@@ -61,8 +51,6 @@ pub(super) struct PoseTrack {
     sequence: Sequence,
     /// Frame of the sequence at the first pose.
     first: u64,
-    /// Frames of the sequence per pose.
-    stride: u64,
     /// Turn between two poses (rad).
     turn: f64,
     /// Poses before the turn begins.
@@ -73,9 +61,7 @@ impl PoseTrack {
     /// Poses of an actor at `rate` (1/s).
     pub(super) fn new(actor: &Actor, motion: &ScanMotion, rate: f64) -> Result<Self, ClipError> {
         let routine = match motion {
-            ScanMotion::Play { routine, .. }
-            | ScanMotion::TurnOnSpot { routine, .. }
-            | ScanMotion::Turn { routine, .. } => *routine,
+            ScanMotion::Play { routine, .. } | ScanMotion::Turn { routine, .. } => *routine,
             ScanMotion::Clip { .. } => Routine::Still,
         };
         let setting = Setting {
@@ -88,25 +74,22 @@ impl PoseTrack {
             ..Setting::default()
         };
         let mut sequence = Sequence::new(actor.clone(), setting);
-        let (mut start, mut delay, mut speed) = (0.0, 0.0, 0.0);
-        match motion {
-            ScanMotion::Play { start: at, .. } => start = *at,
-            ScanMotion::TurnOnSpot { speed: rate, .. } => speed = *rate,
+        let (start, delay, speed) = match motion {
+            ScanMotion::Play { start, .. } => (*start, 0.0, 0.0),
             ScanMotion::Turn {
-                start: at,
-                delay: wait,
-                speed: rate,
+                start,
+                delay,
+                speed,
                 ..
-            } => (start, delay, speed) = (*at, *wait, *rate),
-            ScanMotion::Clip { clip, start: at } => {
+            } => (*start, *delay, *speed),
+            ScanMotion::Clip { clip, start } => {
                 sequence = sequence.with_clip((**clip).clone())?;
-                start = CLIP_LEAD + at;
+                (sequence.clip_lead() + start, 0.0, 0.0)
             }
-        }
+        };
         Ok(Self {
             sequence,
             first: (start * rate).round().max(0.0) as u64,
-            stride: u64::from(!matches!(motion, ScanMotion::TurnOnSpot { .. })),
             turn: speed / rate,
             delay: delay * rate,
         })
@@ -114,7 +97,7 @@ impl PoseTrack {
 
     /// Pose number `index` in the world: y up, floor at y = 0.
     pub(super) fn pose(&self, index: u64) -> Pose<World> {
-        let truth = self.sequence.truth(self.first + self.stride * index);
+        let truth = self.sequence.truth(self.first + index);
         let turn = UnitQuaternion::from_axis_angle(
             &V3d::y_axis(),
             self.turn * (index as f64 - self.delay).max(0.0),

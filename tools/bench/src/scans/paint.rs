@@ -1,6 +1,7 @@
 //! Colours of skin, hair and garments, with baked light.
 
-use super::points::{SKIN_LABEL, STRAY_LABEL};
+use super::points::SKIN_LABEL;
+use super::settings::ScanSettings;
 use super::surface::SceneSurface;
 use rand::{Rng, SeedableRng};
 use tryon_body::{RestBody, Template};
@@ -37,7 +38,7 @@ struct GarmentPaint {
 
 /// Landmarks of the head of a rest body, frame of the body (m).
 #[derive(Clone, Copy, Debug, Default)]
-struct HeadFrame {
+pub(super) struct HeadFrame {
     /// Base of the skull.
     base: V3,
     /// Height of the crown over the base.
@@ -70,22 +71,6 @@ const HAIR_COLORS: [[f32; 3]; 5] = [
     [190.0, 158.0, 104.0],
     [150.0, 148.0, 146.0],
 ];
-/// Colour of a held object.
-const OBJECT_COLOR: [f32; 3] = [176.0, 92.0, 40.0];
-/// Step of the hue from garment to garment: golden ratio, so that hues stay apart.
-const HUE_STEP: f32 = 0.618;
-/// Ratio of brightness between neighbouring garments of [`ScanPalette::LowContrast`].
-const CONTRAST: f32 = 1.06;
-/// Direction of the light, and of a weaker one, world; y is up.
-const LIGHT: [f32; 3] = [0.35, 0.75, 0.55];
-const FILL: [f32; 3] = [-0.6, 0.3, -0.7];
-/// Shares of ambient light, light and weaker light.
-const SHADE: [f32; 3] = [0.50, 0.42, 0.20];
-/// Change of red, green and blue in a light that is wholly warm.
-const WARMTH: [f32; 3] = [0.5, 0.0, -0.5];
-/// Brightness of a place that no camera sees, over that of an open one.
-const OCCLUDED: f32 = 0.55;
-
 /// Surface with the colours of its parts.
 #[derive(Clone, Copy)]
 pub(super) struct PaintedSurface<'a> {
@@ -94,12 +79,12 @@ pub(super) struct PaintedSurface<'a> {
 }
 
 impl ScenePaint {
-    /// Colours of a subject with `garments` garments.
+    /// Colours of a subject with this head and `garments` garments.
     pub(super) fn new(
-        template: &Template,
-        rest: &RestBody,
+        head: HeadFrame,
         garments: usize,
         palette: ScanPalette,
+        settings: &ScanSettings,
         seed: u64,
     ) -> Self {
         let mut rng = rand_pcg::Pcg64::seed_from_u64(seed);
@@ -108,9 +93,11 @@ impl ScenePaint {
         let (hue, value) = (rng.random_range(0.0..1.0f32), rng.random_range(0.3..0.8f32));
         let saturation = rng.random_range(0.15..0.7f32);
         let garments = (0..garments).map(|k| match palette {
-            ScanPalette::Distinct => GarmentPaint::random(hue + HUE_STEP * k as f32, &mut rng),
+            ScanPalette::Distinct => {
+                GarmentPaint::random(hue + settings.hue_step * k as f32, &mut rng)
+            }
             ScanPalette::LowContrast => {
-                let factor = if k % 2 == 0 { 1.0 } else { CONTRAST };
+                let factor = if k % 2 == 0 { 1.0 } else { settings.contrast };
                 GarmentPaint::plain(hsv(hue, saturation, value * factor))
             }
             ScanPalette::Uniform => GarmentPaint::plain(hsv(hue, saturation, value)),
@@ -119,7 +106,7 @@ impl ScenePaint {
             skin,
             hair,
             garments: garments.collect(),
-            head: HeadFrame::new(template, rest),
+            head,
         }
     }
 
@@ -128,26 +115,25 @@ impl ScenePaint {
         match label {
             SKIN_LABEL if self.head.has_hair(material) => self.hair,
             SKIN_LABEL => self.skin,
-            STRAY_LABEL => OBJECT_COLOR,
             garment => {
                 let paint = self.garments.get(usize::from(garment) - 1);
-                paint.map_or(OBJECT_COLOR, |p| p.color(material))
+                paint.map_or(self.skin, |p| p.color(material))
             }
         }
     }
 }
 
-/// Brightness at a normal in white light, for the share of cameras that see the place.
-pub(super) fn shade(normal: &V3, openness: f32) -> f32 {
-    tinted_shade(normal, openness, 0.0).y
-}
-
-/// Brightness of red, green and blue; `tint` is the share by which the light is warmer and the weaker one colder.
-pub(super) fn tinted_shade(normal: &V3, openness: f32, tint: f32) -> V3 {
+/// Brightness of red, green and blue at a normal, for the share of cameras that see the place; `tint` is the share by which the light is warmer and the weaker one colder.
+pub(super) fn tinted_shade(settings: &ScanSettings, normal: &V3, openness: f32, tint: f32) -> V3 {
     let toward = |d: [f32; 3]| normal.dot(&V3::from(d).normalize()).max(0.0);
-    let (light, fill) = (SHADE[1] * toward(LIGHT), SHADE[2] * toward(FILL));
-    let open = OCCLUDED + (1.0 - OCCLUDED) * openness;
-    V3::from(WARMTH).map(|w| (SHADE[0] + light * (1.0 + tint * w) + fill * (1.0 - tint * w)) * open)
+    let ([key, weak], [ambient, ..]) = (settings.lights, settings.shade);
+    let (light, fill) = (
+        settings.shade[1] * toward(key),
+        settings.shade[2] * toward(weak),
+    );
+    let open = settings.occluded + (1.0 - settings.occluded) * openness;
+    let lit = |w: f32| (ambient + light * (1.0 + tint * w) + fill * (1.0 - tint * w)) * open;
+    V3::from(settings.warmth).map(lit)
 }
 
 impl GarmentPaint {
@@ -195,7 +181,7 @@ impl GarmentPaint {
 }
 
 impl HeadFrame {
-    fn new(template: &Template, rest: &RestBody) -> Self {
+    pub(super) fn new(template: &Template, rest: &RestBody) -> Self {
         let Some(joint) = template.skeleton().index("head") else {
             return Self::default();
         };

@@ -1,14 +1,12 @@
-//! Visible points of a surface, uniform by area; and its visible triangles.
+//! Visible points of a surface, uniform by area.
 
 use super::surface::SceneSurface;
 use super::view::ViewRing;
 use rand::Rng;
 use tryon_geometry::math::{P3, V3};
-use tryon_geometry::mesh::{Face, face_normal};
+use tryon_geometry::mesh::face_normal;
 use tryon_geometry::par::{self, Par};
 
-/// Candidates drawn at once, as a multiple of the points still missing.
-const OVERSAMPLING: f64 = 1.3;
 /// Rounds after which a surface counts as hidden.
 const ROUNDS: usize = 24;
 
@@ -48,7 +46,7 @@ pub(super) fn sample(
             break;
         }
         let missing = count - out.len();
-        let tries = ((missing as f64 * OVERSAMPLING) as usize).max(64);
+        let tries = ((missing as f64 * surface.settings.oversampling) as usize).max(64);
         let places: Vec<(u32, [f32; 3])> = (0..tries)
             .map(|_| {
                 let at = rng.random_range(0.0..total);
@@ -64,43 +62,6 @@ pub(super) fn sample(
         out.extend(seen.into_iter().flatten().take(missing));
     }
     out
-}
-
-/// Visible part of a surface as a mesh: a sample per vertex, and the faces between them.
-///
-/// A face is visible if its centroid is.
-pub(super) fn visible_mesh(
-    surface: &SceneSurface,
-    ring: &ViewRing,
-    candidates: &[bool],
-) -> (Vec<SurfaceSample>, Vec<Face>) {
-    let third = 1.0 / 3.0;
-    let mut kept = Vec::new();
-    par::map_into(Par::Rayon, surface.faces.len(), 256, &mut kept, |f| {
-        let seen = candidates[f].then(|| visible(surface, ring, f as u32, [third; 3]));
-        seen.flatten()
-    });
-    let mut index = vec![u32::MAX; surface.vertices.len()];
-    let (mut samples, mut faces) = (Vec::new(), Vec::new());
-    for center in kept.iter().flatten() {
-        let corners = surface.faces[center.face as usize];
-        for (k, v) in corners.iter().enumerate() {
-            let v = *v as usize;
-            if index[v] == u32::MAX {
-                index[v] = samples.len() as u32;
-                let mut weights = [0.0; 3];
-                weights[k] = 1.0;
-                samples.push(SurfaceSample {
-                    weights,
-                    point: surface.vertices[v],
-                    normal: surface.normals[v],
-                    ..*center
-                });
-            }
-        }
-        faces.push(corners.map(|v| index[v as usize]));
-    }
-    (samples, faces)
 }
 
 /// Sample at a place of a face; `None` if no camera sees it.

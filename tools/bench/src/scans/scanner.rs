@@ -1,10 +1,10 @@
 //! Virtual body scanner: visible points or triangles of a surface, with noise.
 
 use super::camera_rig::CameraRig;
-use super::paint::{PaintedSurface, ScenePaint, tinted_shade};
+use super::paint::{PaintedSurface, tinted_shade};
 use super::points::ScanPoints;
 use super::random::{ScanSeed, gauss};
-use super::sampling::{SurfaceSample, sample, visible_mesh};
+use super::sampling::{SurfaceSample, sample};
 use super::surface::SceneSurface;
 use super::view::ViewRing;
 use tryon_geometry::math::V3;
@@ -12,7 +12,7 @@ use tryon_geometry::math::V3;
 /// Settings of the scanner.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ScannerSetting {
-    /// Visible points before holes; unused for a mesh.
+    /// Visible points.
     pub points: usize,
     /// Standard deviation of the depth noise along the view (m).
     pub noise: f64,
@@ -22,8 +22,6 @@ pub struct ScannerSetting {
     pub color_noise: f64,
     /// Colour of the lights: share by which the main light is warmer and the fill light colder than white.
     pub light_tint: f32,
-    /// Output of the visible triangles in place of a cloud.
-    pub is_meshed: bool,
     /// Depth cameras in place of the scanner; of the settings above only `points` matters to them.
     pub rig: Option<CameraRig>,
 }
@@ -37,7 +35,6 @@ impl Default for ScannerSetting {
             normal_noise: 0.08,
             color_noise: 3.0,
             light_tint: 0.0,
-            is_meshed: false,
             rig: None,
         }
     }
@@ -51,36 +48,24 @@ const NORMAL_NOISE: u64 = 4;
 
 impl ScannerSetting {
     /// Scans a surface.
-    pub(super) fn scan(
-        &self,
-        surface: &SceneSurface,
-        paint: &ScenePaint,
-        seed: ScanSeed,
-    ) -> ScanPoints {
+    pub(super) fn scan(&self, painted: PaintedSurface<'_>, seed: ScanSeed) -> ScanPoints {
         if let Some(rig) = &self.rig {
-            return rig.scan(PaintedSurface { surface, paint }, self.points, seed);
+            return rig.scan(painted, self.points, seed);
         }
+        let surface = painted.surface;
         let ring = ViewRing::draw(surface, surface.center());
         let openness = ring.openness(surface);
         let candidates = ring.candidates(surface, &openness);
-        let (samples, faces) = if self.is_meshed {
-            visible_mesh(surface, &ring, &candidates)
-        } else {
-            let mut rng = seed.stage(SAMPLING);
-            let samples = sample(surface, &ring, &candidates, self.points, &mut rng);
-            (samples, Vec::new())
-        };
+        let mut rng = seed.stage(SAMPLING);
+        let samples = sample(surface, &ring, &candidates, self.points, &mut rng);
         let brightness: Vec<V3> = (surface.normals.iter().zip(&openness))
-            .map(|(n, open)| tinted_shade(n, *open, self.light_tint))
+            .map(|(n, open)| tinted_shade(&surface.settings, n, *open, self.light_tint))
             .collect();
-        let mut out = ScanPoints {
-            faces,
-            ..ScanPoints::default()
-        };
+        let mut out = ScanPoints::default();
         let [mut depth, mut tint, mut tilt] =
             [NOISE, COLOR_NOISE, NORMAL_NOISE].map(|stage| seed.stage(stage));
         for s in &samples {
-            let color = lit_color(surface, paint, &brightness, s);
+            let color = lit_color(painted, &brightness, s);
             let color = color.map(|c| (c + gauss(&mut tint, self.color_noise)).clamp(0.0, 255.0));
             let point = s.point + s.toward * gauss(&mut depth, self.noise);
             let off = V3::from_fn(|_, _| gauss(&mut tilt, self.normal_noise));
@@ -92,12 +77,8 @@ impl ScannerSetting {
 }
 
 /// Lit colour of a sample; `brightness` has the shape `[vertices]`.
-fn lit_color(
-    surface: &SceneSurface,
-    paint: &ScenePaint,
-    brightness: &[V3],
-    s: &SurfaceSample,
-) -> [f32; 3] {
+fn lit_color(painted: PaintedSurface<'_>, brightness: &[V3], s: &SurfaceSample) -> [f32; 3] {
+    let PaintedSurface { surface, paint } = painted;
     let face = &surface.faces[s.face as usize];
     let material = SceneSurface::blend(&surface.material, face, s.weights);
     let light = SceneSurface::blend(brightness, face, s.weights);

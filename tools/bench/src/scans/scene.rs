@@ -1,28 +1,21 @@
 //! Scene of a scanned, dressed, moving subject.
 
 use super::cloth_run::{ClothRun, ScanGarment, ScanWardrobe};
-use super::defects::ScanDefects;
 use super::motion::{PoseTrack, ScanMotion};
-use super::paint::{ScanPalette, ScenePaint};
+use super::paint::{HeadFrame, PaintedSurface, ScanPalette, ScenePaint};
 use super::points::ScanPoints;
 use super::random::ScanSeed;
 use super::scanner::ScannerSetting;
+use super::settings::ScanSettings;
 use super::skinned::SkinnedGarment;
 use super::surface::SceneSurface;
 use super::view::MAX_GARMENT;
 use crate::EvaluateError;
 use tryon::mirror::Choice;
-use tryon_body::{BodyShape, Pose, RestBody};
-use tryon_garment::{AnchorKind, GarmentError, GarmentKind, GarmentMesh};
-use tryon_geometry::math::{P3, V3, World};
+use tryon_garment::{GarmentError, GarmentMesh};
+use tryon_geometry::math::{P3, V3};
 use tryon_geometry::mesh::Face;
 use tryon_synth::Actor;
-
-/// Least rate of the simulation (1/s).
-const SIMULATION_RATE: f64 = 60.0;
-
-/// 99th percentile of the stretch of a garment that is caught or torn: dances reach 0.25 for a frame.
-const MAX_STRAIN: f64 = 0.25;
 
 /// Settings of a sequence of scans.
 #[derive(Clone, Debug)]
@@ -39,16 +32,16 @@ pub struct ScanScene {
     pub palette: ScanPalette,
     /// Scanner.
     pub scanner: ScannerSetting,
-    /// Defects.
-    pub defects: ScanDefects,
     /// Number of scans.
     pub scans: usize,
     /// Scans per second.
     pub rate: f64,
     /// Edge length of garments cut from patterns (m).
     pub edge: f64,
-    /// Seed of colours, points, noise and defects.
+    /// Seed of colours, points and noise.
     pub seed: u64,
+    /// Cloth, cameras and light.
+    pub settings: ScanSettings,
 }
 
 impl Default for ScanScene {
@@ -61,11 +54,11 @@ impl Default for ScanScene {
             motion: ScanMotion::default(),
             palette: ScanPalette::default(),
             scanner: ScannerSetting::default(),
-            defects: ScanDefects::default(),
             scans: 1,
             rate: 10.0,
             edge: 0.021,
             seed: 1,
+            settings: ScanSettings::default(),
         }
     }
 }
@@ -75,10 +68,6 @@ impl Default for ScanScene {
 pub struct TrueGarment {
     /// Name of the garment; pieces of one file share it.
     pub name: String,
-    /// Kind.
-    pub kind: GarmentKind,
-    /// Buttons, belts and other parts that keep their shape.
-    pub is_rigid: bool,
     /// Posed vertices, world (m).
     pub vertices: Vec<P3>,
     /// Triangles, the same in all scans.
@@ -89,30 +78,19 @@ pub struct TrueGarment {
 #[derive(Clone, Copy)]
 pub(super) struct SceneMoment<'a> {
     pub(super) index: usize,
-    pub(super) surface: &'a SceneSurface,
-    pub(super) paint: &'a ScenePaint,
+    pub(super) painted: PaintedSurface<'a>,
     run: &'a ClothRun<'a>,
-    rest: &'a RestBody,
-    pose: &'a Pose<World>,
 }
 
 /// Scan with its truth. Arrays of points have the shape `[points]`.
 #[derive(Clone, Debug)]
 pub struct TrueScan {
-    /// Number of the scan.
-    pub index: usize,
-    /// Time since the first scan (s).
-    pub time: f64,
     /// Positions, world (m); y up, floor at y = 0.
     pub points: Vec<P3>,
     /// Unit normals on the side of the cameras; empty in clouds of a [`CameraRig`](super::CameraRig).
     pub normals: Vec<V3>,
-    /// Triangles; empty for a cloud.
-    pub faces: Vec<Face>,
-    /// Colours, sRGB; black where lost.
+    /// Colours, sRGB.
     pub colors: Vec<[u8; 3]>,
-    /// Rows whose colour is lost, ascending; in files they are NaN.
-    pub uncolored: Vec<u32>,
     /// True garment from 1 in the order of `garments`, [`SKIN_LABEL`](super::SKIN_LABEL) or
     /// [`STRAY_LABEL`](super::STRAY_LABEL).
     pub labels: Vec<u8>,
@@ -124,19 +102,8 @@ pub struct TrueScan {
     pub body_faces: Vec<Face>,
     /// True garments, innermost first.
     pub garments: Vec<TrueGarment>,
-    /// Pose of the template.
-    pub pose: Pose<World>,
-    /// Shape of the subject.
-    pub shape: BodyShape,
     /// Largest 99th percentile of the cloth's stretch so far.
     pub strain: f64,
-}
-
-impl TrueScan {
-    /// True if no garment is caught or torn.
-    pub fn is_sound(&self) -> bool {
-        self.strain < MAX_STRAIN
-    }
 }
 
 impl ScanScene {
@@ -166,42 +133,6 @@ impl ScanScene {
         Ok(all)
     }
 
-    /// Makes the first scan once with each scanner and its seed of colours, points, noise and defects; the clothes are put on
-    /// once.
-    ///
-    /// # Errors
-    /// As [`Self::run`].
-    pub fn first_scans(
-        &self,
-        scanners: &[(ScannerSetting, u64)],
-    ) -> Result<Vec<TrueScan>, EvaluateError> {
-        let first = Self {
-            scans: 1,
-            ..self.clone()
-        };
-        let mut all = Vec::new();
-        first.play(|moment| {
-            for (scanner, seed) in scanners {
-                let one = Self {
-                    scanner: scanner.clone(),
-                    seed: *seed,
-                    ..first.clone()
-                };
-                let count = moment.run.garments().count();
-                let template = &self.actor.template;
-                let paint = ScenePaint::new(template, moment.rest, count, self.palette, *seed);
-                let painted = SceneMoment {
-                    paint: &paint,
-                    ..moment
-                };
-                let points = one.scanned(&painted);
-                all.push(one.truth(&painted, points));
-            }
-            Ok(())
-        })?;
-        Ok(all)
-    }
-
     /// Makes the scans one after the other; `each` receives them.
     ///
     /// # Errors
@@ -216,18 +147,21 @@ impl ScanScene {
         })
     }
 
-    /// Scan points of the subject, with their defects.
+    /// Scan points of the subject.
     fn scanned(&self, moment: &SceneMoment<'_>) -> ScanPoints {
-        let seed = ScanSeed {
-            scene: self.seed,
-            scan: moment.index as u64,
-        };
-        let mut points = self.scanner.scan(moment.surface, moment.paint, seed);
-        (self.defects).apply(&mut points, moment.surface.center(), seed);
+        let mut points = self.scanner.scan(moment.painted, self.seed(moment.index));
         if self.scanner.rig.is_some() {
             points.normals.clear();
         }
         points
+    }
+
+    /// Random numbers of one scan.
+    pub(super) fn seed(&self, index: usize) -> ScanSeed {
+        ScanSeed {
+            scene: self.seed,
+            scan: index as u64,
+        }
     }
 
     /// Dresses the subject and simulates its motion; `each` receives the subject at the time of each scan.
@@ -238,7 +172,7 @@ impl ScanScene {
         if !(self.rate > 0.0 && self.rate.is_finite()) {
             return Err(fault(format!("rate: {} is not positive", self.rate)));
         }
-        let steps = (SIMULATION_RATE / self.rate).ceil().max(1.0) as u64;
+        let steps = (self.settings.simulation_rate / self.rate).ceil().max(1.0) as u64;
         let rate = self.rate * steps as f64;
         let template = &self.actor.template;
         let rest = template.personalise(&self.actor.shape);
@@ -248,6 +182,7 @@ impl ScanScene {
             patterns: &self.garments,
             edge: self.edge,
             skinned: &self.skinned,
+            settings: &self.settings,
         };
         let dt = 1.0 / rate;
         let mut run = ClothRun::new(template, &rest, &pose, &wardrobe, dt).map_err(fault)?;
@@ -255,7 +190,8 @@ impl ScanScene {
         if count > MAX_GARMENT {
             return Err(fault(format!("{count} garments do not fit the labels")));
         }
-        let paint = ScenePaint::new(template, &rest, count, self.palette, self.seed);
+        let head = HeadFrame::new(template, &rest);
+        let paint = ScenePaint::new(head, count, self.palette, &self.settings, self.seed);
         for index in 0..self.scans {
             if index > 0 {
                 for k in 1..=steps {
@@ -263,14 +199,15 @@ impl ScanScene {
                     run.step(&pose, dt).map_err(fault)?;
                 }
             }
-            let surface = SceneSurface::new(&run, template, &rest, self.defects.has_object);
-            each(SceneMoment {
-                index,
+            let surface = SceneSurface::new(&run, template, &rest, self.settings);
+            let painted = PaintedSurface {
                 surface: &surface,
                 paint: &paint,
+            };
+            each(SceneMoment {
+                index,
+                painted,
                 run: &run,
-                rest: &rest,
-                pose: &pose,
             })?;
         }
         Ok(())
@@ -278,41 +215,27 @@ impl ScanScene {
 
     /// Truth of one time with the scan points of it.
     pub(super) fn truth(&self, moment: &SceneMoment<'_>, points: ScanPoints) -> TrueScan {
-        let (index, run, pose) = (moment.index, moment.run, moment.pose);
-        let is_lost = |c: &[f32; 3]| c.iter().any(|c| c.is_nan());
-        let lost = (0..).zip(&points.colors).filter(|(_, c)| is_lost(c));
+        let run = moment.run;
         let garment = |(mesh, vertices): (&GarmentMesh, &[P3])| TrueGarment {
             name: mesh.name.clone(),
-            kind: mesh.kind,
-            is_rigid: mesh.anchors.iter().any(|a| a.kind == AnchorKind::Rigid),
             vertices: vertices.to_vec(),
             faces: mesh.faces.clone(),
         };
         TrueScan {
-            index,
-            time: index as f64 / self.rate,
-            uncolored: lost.map(|(row, _)| row).collect(),
-            // A conversion of NaN is 0.
             colors: (points.colors.iter())
                 .map(|c| c.map(|c| c.round() as u8))
                 .collect(),
             points: points.points,
             normals: points.normals,
-            faces: points.faces,
             labels: points.labels,
             body: run.body().to_vec(),
             body_faces: self.actor.template.mesh().faces().to_vec(),
             garments: run.garments().map(garment).collect(),
-            pose: pose.clone(),
-            shape: self.actor.shape.clone(),
             strain: run.strain,
         }
     }
 }
 
 fn fault(why: impl ToString) -> EvaluateError {
-    EvaluateError::Scene {
-        scene: "scans".into(),
-        why: why.to_string(),
-    }
+    EvaluateError::new("scans", why)
 }

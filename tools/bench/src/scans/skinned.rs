@@ -1,6 +1,7 @@
 //! Garments that follow the bones of the body below them, without a simulation: for straps, bibs and scarves that cloth
 //! held at the shoulders or the waist alone would drop.
 
+use super::settings::ScanSettings;
 use nalgebra::Matrix4;
 use std::path::Path;
 use tryon_body::{BoneTransforms, RestBody, Template};
@@ -15,8 +16,6 @@ use tryon_geometry::mesh::{Csr, Face, TriMesh, remesh};
 use tryon_geometry::par::Par;
 use tryon_geometry::spatial::Bvh;
 
-/// Smallest garment (m): smaller parts are buttons and are left out.
-const SMALLEST: f32 = 0.08;
 /// Vertices of the body in the base mesh hm08; shells that clothes are bound to follow.
 const BODY_VERTICES: u32 = 13_380;
 /// Rounds of smoothing of displacements and weights over a garment: closest skin jumps, cloth does not.
@@ -65,6 +64,7 @@ impl SkinnedGarment {
         base: &Path,
         parts: GarmentParts,
         edge: f64,
+        settings: &ScanSettings,
     ) -> Result<Vec<Self>, String> {
         let base = read_obj(base).map_err(|e| e.to_string())?.mesh;
         let file = read_mesh(clothes, Some(base.vertices())).map_err(|e| e.to_string())?;
@@ -84,7 +84,7 @@ impl SkinnedGarment {
         });
         let is_large = |m: &TriMesh| {
             m.bounds()
-                .is_some_and(|(lo, hi)| (hi - lo).amax() > SMALLEST)
+                .is_some_and(|(lo, hi)| (hi - lo).amax() > settings.smallest)
         };
         let made = meshes.filter(is_large);
         let made = made.map(|mesh| Self::new(&file.name, &remesh(&mesh, edge), &source));

@@ -1,28 +1,18 @@
-//! Surfaces of one scan in one mesh: skin, garments, a held object.
+//! Surfaces of one scan in one mesh: skin and garments.
 
 use super::cloth_run::ClothRun;
-use super::points::{SKIN_LABEL, STRAY_LABEL};
-use tryon_body::parts::BodyPart;
+use super::points::SKIN_LABEL;
+use super::settings::ScanSettings;
 use tryon_body::{RestBody, Template};
 use tryon_geometry::math::{P3, V3};
 use tryon_geometry::mesh::{Csr, Face, vertex_normals};
 use tryon_geometry::par::Par;
 use tryon_geometry::spatial::PointTree;
 
-/// Depth by which a layer is drawn below the one over it (m): cloth that reaches into the layer below still hides it.
-const LAYER_INSET: f32 = 0.01;
-/// Distance within which cloth counts as over a vertex (m): a little more than the edges of cloth.
-const COVER_RADIUS: f32 = 0.025;
-/// Largest height of a vertex over the cloth that should cover it (m).
-const POKE: f32 = 0.02;
-/// Radius of the held ball, and its offset from the hand towards the floor (m).
-const BALL: [f32; 2] = [0.07, 0.09];
-/// Rings and columns of the ball.
-const BALL_GRID: [u32; 2] = [14, 20];
-
 /// Mesh of everything that a scanner can see. Vertex arrays have the shape `[vertices]`.
 #[derive(Clone, Debug, Default)]
 pub(super) struct SceneSurface {
+    pub(super) settings: ScanSettings,
     /// True positions, world (m).
     pub(super) vertices: Vec<P3>,
     /// Positions as they hide each other.
@@ -31,7 +21,7 @@ pub(super) struct SceneSurface {
     pub(super) faces: Vec<Face>,
     /// Unit normals, outward.
     pub(super) normals: Vec<V3>,
-    /// Garment number from 1, [`SKIN_LABEL`] or [`STRAY_LABEL`].
+    /// Garment number from 1, or [`SKIN_LABEL`].
     pub(super) labels: Vec<u8>,
     /// Place on the material (m): rest position on skin, texture coordinates on cloth.
     pub(super) material: Vec<V3>,
@@ -51,9 +41,12 @@ impl SceneSurface {
         run: &ClothRun<'_>,
         template: &Template,
         rest: &RestBody,
-        has_object: bool,
+        settings: ScanSettings,
     ) -> Self {
-        let mut out = Self::default();
+        let mut out = Self {
+            settings,
+            ..Self::default()
+        };
         let faces = template.mesh().faces();
         out.add(
             &SurfacePart {
@@ -82,9 +75,6 @@ impl SceneSurface {
             out.add(&part, uv.map(|uv| V3::new(uv[0], uv[1], 0.0)));
         }
         out.inset_covered();
-        if has_object {
-            out.add_ball(run, template);
-        }
         out
     }
 
@@ -127,12 +117,13 @@ impl SceneSurface {
             for i in ranges[label].clone() {
                 let (p, n) = (&self.vertices[i], &self.normals[i]);
                 for cover in label + 1..ranges.len() {
-                    let Some((near, _)) = trees[cover].nearest(p, COVER_RADIUS) else {
+                    let Some((near, _)) = trees[cover].nearest(p, self.settings.cover_radius)
+                    else {
                         continue;
                     };
                     let near = ranges[cover].start + near;
-                    if n.dot(&(self.vertices[near] - p)) > -POKE {
-                        depth[i] = depth[i].max(depth[near] + LAYER_INSET);
+                    if n.dot(&(self.vertices[near] - p)) > -self.settings.poke {
+                        depth[i] = depth[i].max(depth[near] + self.settings.layer_inset);
                     }
                 }
             }
@@ -151,41 +142,6 @@ impl SceneSurface {
         self.material.extend(material);
         let faces = part.faces.iter().map(|f| f.map(|v| v + first));
         self.faces.extend(faces);
-    }
-
-    /// Adds a ball in the right hand; a template without arms holds none.
-    fn add_ball(&mut self, run: &ClothRun<'_>, template: &Template) {
-        let Some(arm) = template.parts().limb(BodyPart::RightArm) else {
-            return;
-        };
-        let [radius, below] = BALL;
-        let center = run.joints()[arm.tip].cast::<f32>() - V3::y() * below;
-        let [rings, columns] = BALL_GRID;
-        let mut directions = Vec::new();
-        for ring in 0..=rings {
-            let (sin, cos) = (std::f32::consts::PI * ring as f32 / rings as f32).sin_cos();
-            for column in 0..columns {
-                let turn = std::f32::consts::TAU * column as f32 / columns as f32;
-                directions.push(V3::new(sin * turn.sin(), cos, sin * turn.cos()));
-            }
-        }
-        let mut faces = Vec::new();
-        for ring in 0..rings {
-            for column in 0..columns {
-                let at = |r: u32, c: u32| r * columns + c % columns;
-                let quad = [(0, 0), (1, 0), (1, 1), (0, 1)].map(|(r, c)| at(ring + r, column + c));
-                faces.push([quad[0], quad[1], quad[2]]);
-                faces.push([quad[0], quad[2], quad[3]]);
-            }
-        }
-        let vertices: Vec<P3> = directions.iter().map(|d| center + d * radius).collect();
-        let part = SurfacePart {
-            label: STRAY_LABEL,
-            vertices: &vertices,
-            normals: &directions,
-            faces: &faces,
-        };
-        self.add(&part, directions.iter().copied());
     }
 }
 

@@ -1,5 +1,6 @@
 //! Ring of virtual cameras around a subject, and the surface that each sees.
 
+use super::settings::ScanSettings;
 use super::surface::SceneSurface;
 use nalgebra::Matrix3;
 use tryon_geometry::camera::Intrinsics;
@@ -9,12 +10,6 @@ use tryon_geometry::raster::{Options, View, VisibilityBuffer, rasterise_with};
 
 /// Cameras at each height.
 const CAMERAS: usize = 12;
-/// Heights of the cameras (m): below the knees, chest, above the head.
-const HEIGHTS: [f32; 3] = [0.4, 1.25, 2.6];
-/// Distance of the cameras from the vertical through the subject (m).
-const DISTANCE: f32 = 2.2;
-/// Height of the point that all cameras aim at (m).
-const AIM: f32 = 1.0;
 /// Cameras: a pixel is 4 mm on the subject; raised arms are in the picture.
 const CAMERA: Intrinsics = Intrinsics {
     width: 480,
@@ -24,17 +19,12 @@ const CAMERA: Intrinsics = Intrinsics {
     cx: 239.5,
     cy: 359.5,
 };
-/// Near plane (m).
-const NEAR: f32 = 0.3;
-/// Depth within which a point is on the visible surface (m).
-const TOLERANCE: f32 = 0.003;
-/// Cosine of the angle between normal and ray below which scanners lose the surface.
-const MIN_COSINE: f32 = 0.2;
 /// Label of an empty pixel.
 const EMPTY: u8 = 254;
 
 /// Depth and labels from one camera.
 pub(super) struct ScanView {
+    settings: ScanSettings,
     rotation: Matrix3<f32>,
     pub(super) eye: P3,
     depth: Vec<f32>,
@@ -65,7 +55,7 @@ impl ScanView {
             .collect();
         let view = View::Perspective {
             camera: CAMERA,
-            near: NEAR,
+            near: surface.settings.near,
         };
         let mut buffer = VisibilityBuffer::default();
         rasterise_with(
@@ -86,6 +76,7 @@ impl ScanView {
             }
         }
         Self {
+            settings: surface.settings,
             rotation,
             eye,
             depth: buffer.depth,
@@ -103,11 +94,11 @@ impl ScanView {
         } else {
             cosine.abs()
         };
-        if facing < MIN_COSINE {
+        if facing < self.settings.min_cosine {
             return None;
         }
         let q = P3::from(self.rotation * (p - self.eye));
-        if q.z < NEAR {
+        if q.z < self.settings.near {
             return None;
         }
         let pixel = CAMERA.project(&q);
@@ -120,7 +111,7 @@ impl ScanView {
         // Depth changes across the pixel by its width times the tangent of the slope.
         let slope = (1.0 - facing * facing).sqrt() / facing;
         let across = 0.5 * q.z / CAMERA.fx as f32 * slope;
-        let is_on_surface = (q.z - self.depth[i]).abs() < TOLERANCE + across;
+        let is_on_surface = (q.z - self.depth[i]).abs() < self.settings.tolerance + across;
         (self.labels[i] == label && is_on_surface).then_some(cosine)
     }
 }
@@ -128,19 +119,18 @@ impl ScanView {
 impl ViewRing {
     /// Draws a surface from a ring around `center`, the subject's place on the floor.
     pub(super) fn draw(surface: &SceneSurface, center: P3) -> Self {
+        let settings = &surface.settings;
+        let heights = settings.ring_heights;
         let mut seen_faces = vec![false; surface.faces.len()];
         let mut views = Vec::new();
-        for (k, height) in HEIGHTS.iter().enumerate() {
+        for (k, height) in heights.iter().enumerate() {
             for i in 0..CAMERAS {
                 // Rings are turned against each other.
-                let turn = (i as f32 + k as f32 / HEIGHTS.len() as f32) / CAMERAS as f32;
+                let turn = (i as f32 + k as f32 / heights.len() as f32) / CAMERAS as f32;
                 let (sin, cos) = (std::f32::consts::TAU * turn).sin_cos();
-                let eye = P3::new(
-                    center.x + DISTANCE * sin,
-                    *height,
-                    center.z + DISTANCE * cos,
-                );
-                let aim = P3::new(center.x, AIM, center.z);
+                let away = settings.ring_distance;
+                let eye = P3::new(center.x + away * sin, *height, center.z + away * cos);
+                let aim = P3::new(center.x, settings.ring_aim, center.z);
                 views.push(ScanView::draw(eye, aim, surface, &mut seen_faces));
             }
         }
@@ -163,7 +153,7 @@ impl ViewRing {
             let (p, n) = (&surface.drawn[v], &surface.normals[v]);
             let (mut front, mut open) = (0.0f32, 0.0f32);
             for view in &self.views {
-                if n.dot(&(view.eye - p).normalize()) > MIN_COSINE {
+                if n.dot(&(view.eye - p).normalize()) > view.settings.min_cosine {
                     front += 1.0;
                     let cosine = view.cosine(p, n, surface.labels[v]);
                     open += f32::from(u8::from(cosine.is_some()));

@@ -1,50 +1,60 @@
 //! Plain pictures of surfaces: orthographic, one lamp, a checker along the texture coordinates.
-#![allow(dead_code)] // each example uses a part
 
 use tryon::body::Template;
 use tryon::garment::{GarmentMesh, library};
 use tryon::geometry::math::{P3, V3};
 use tryon::geometry::mesh::{Face, face_normal};
 use tryon::geometry::raster::{View, VisibilityBuffer, interpolate, rasterise};
+use tryon::geometry::settings;
 
-/// Colour of bodies, sRGB, 0 to 1.
-const SKIN: [f32; 3] = [0.86, 0.70, 0.60];
-/// Side of a checker field, metres, and the brightness of the dark ones.
-const CHECKER: (f32, f32) = (0.04, 0.88);
-/// Towards the lamp, in the view's frame.
-const LAMP: [f32; 3] = [-0.45, -0.6, -0.66];
-/// Least brightness.
-const AMBIENT: f32 = 0.3;
-const BACKGROUND: u8 = 250;
+settings! {
+    /// Settings of the pictures; colours are sRGB, 0 to 1.
+    pub struct DrawingSettings {
+        /// Colour of bodies.
+        pub skin: [f32; 3] = [0.86, 0.70, 0.60],
+        /// Side of a checker field (m).
+        pub checker: f32 = 0.04,
+        /// Brightness of the dark fields.
+        pub dark: f32 = 0.88,
+        /// Towards the lamp, in the view's frame.
+        pub lamp: [f32; 3] = [-0.45, -0.6, -0.66],
+        /// Least brightness.
+        pub ambient: f32 = 0.3,
+        /// Grey of the background, 0 to 255.
+        pub background: u8 = 250,
+        /// Space around the body (m).
+        pub margin: f32 = 0.03,
+    }
+}
 
 /// A surface to draw.
-pub(crate) struct DrawnMesh {
+pub(super) struct DrawnMesh {
     /// Metres, y up.
-    pub(crate) vertices: Vec<P3>,
+    pub(super) vertices: Vec<P3>,
     /// Counter-clockwise seen from outside.
-    pub(crate) faces: Vec<Face>,
+    pub(super) faces: Vec<Face>,
     /// sRGB, 0 to 1.
-    pub(crate) color: [f32; 3],
+    pub(super) color: [f32; 3],
     /// Texture coordinates in metres, for the checker. Empty: no checker, and no lining.
-    pub(crate) uv: Vec<[f32; 2]>,
+    pub(super) uv: Vec<[f32; 2]>,
     /// Colour of each vertex instead of `color`, sRGB; empty for none.
-    pub(crate) painted: Vec<[u8; 3]>,
+    pub(super) painted: Vec<[u8; 3]>,
 }
 
 impl DrawnMesh {
     /// A bare body.
-    pub(crate) fn body(template: &Template, vertices: &[P3]) -> Self {
+    pub(super) fn body(template: &Template, vertices: &[P3]) -> Self {
         Self {
             vertices: vertices.to_vec(),
             faces: template.mesh().faces().to_vec(),
-            color: SKIN,
+            color: DrawingSettings::default().skin,
             uv: vec![],
             painted: vec![],
         }
     }
 
     /// A garment at the positions of its simulated vertices, in the colour of the library's garment `dye`.
-    pub(crate) fn garment(mesh: &GarmentMesh, positions: &[P3], dye: &str) -> Self {
+    pub(super) fn garment(mesh: &GarmentMesh, positions: &[P3], dye: &str) -> Self {
         let mut vertices = Vec::new();
         mesh.render_positions(positions, &mut vertices);
         Self {
@@ -63,7 +73,13 @@ impl DrawnMesh {
     }
 
     /// Colour at barycentric coordinates `b` of a face, before light.
-    fn color_at(&self, face: usize, b: [f32; 3], is_inside: bool) -> [f32; 3] {
+    fn color_at(
+        &self,
+        face: usize,
+        b: [f32; 3],
+        is_inside: bool,
+        settings: &DrawingSettings,
+    ) -> [f32; 3] {
         if !self.painted.is_empty() && !is_inside {
             let t = self.faces[face];
             let at = |k: usize, d: usize| f32::from(self.painted[t[k] as usize][d]) / 255.0;
@@ -76,8 +92,8 @@ impl DrawnMesh {
             // The lining: a darker colour of another hue.
             return [1, 2, 0].map(|k| self.color[k] * 0.5);
         }
-        let (side, dark) = CHECKER;
-        let [u, v] = self.uv_at(face, b).map(|x| (x / side).floor());
+        let dark = settings.dark;
+        let [u, v] = self.uv_at(face, b).map(|x| (x / settings.checker).floor());
         let odd = (u + v).rem_euclid(2.0);
         self.color.map(|c| c * (dark + (1.0 - dark) * odd))
     }
@@ -85,19 +101,36 @@ impl DrawnMesh {
 
 /// Position of the viewer and the part of space shown.
 #[derive(Clone, Copy)]
-pub(crate) struct Turn {
+pub(super) struct Turn {
     /// Turn about the vertical axis, radians.
-    pub(crate) yaw: f32,
+    pub(super) yaw: f32,
     /// Width and height of the picture, pixels.
-    pub(crate) cell: (u32, u32),
+    pub(super) cell: [u32; 2],
     /// Lowest and highest y shown, metres.
-    pub(crate) y: [f32; 2],
+    pub(super) y: [f32; 2],
     /// The axis, x and z, metres.
-    pub(crate) centre: [f32; 2],
+    pub(super) centre: [f32; 2],
+}
+
+impl Turn {
+    /// The front of a whole body in a cell of this size, pixels.
+    pub(super) fn around(body: &[P3], cell: [u32; 2]) -> Self {
+        let sum = (body.iter()).fold([0.0; 2], |s, p| [s[0] + p.x, s[1] + p.z]);
+        let range = |y: [f32; 2], p: &P3| [y[0].min(p.y), y[1].max(p.y)];
+        let [low, high] = body.iter().fold([f32::MAX, f32::MIN], range);
+        let margin = DrawingSettings::default().margin;
+        Self {
+            yaw: 0.0,
+            cell,
+            y: [low - margin, high + margin],
+            centre: sum.map(|s| s / body.len() as f32),
+        }
+    }
 }
 
 /// Draws meshes into one picture, RGB bytes.
-pub(crate) fn draw(meshes: &[DrawnMesh], turn: &Turn) -> Vec<u8> {
+pub(super) fn draw(meshes: &[DrawnMesh], turn: &Turn) -> Vec<u8> {
+    let settings = DrawingSettings::default();
     let (s, c) = turn.yaw.sin_cos();
     let (mut all, mut faces, mut owner) = (Vec::new(), Vec::<Face>::new(), Vec::new());
     for (k, m) in meshes.iter().enumerate() {
@@ -114,7 +147,7 @@ pub(crate) fn draw(meshes: &[DrawnMesh], turn: &Turn) -> Vec<u8> {
         let n = face_normal(&all, f);
         f.iter().for_each(|&v| normals[v as usize] += n);
     }
-    let (w, h) = turn.cell;
+    let [w, h] = turn.cell;
     let scale = h as f32 / (turn.y[1] - turn.y[0]);
     let view = View::Orthographic {
         width: w,
@@ -125,8 +158,8 @@ pub(crate) fn draw(meshes: &[DrawnMesh], turn: &Turn) -> Vec<u8> {
     };
     let mut buffer = VisibilityBuffer::default();
     rasterise(&view, &all, &faces, &mut buffer);
-    let lamp = V3::from(LAMP).normalize();
-    let mut out = vec![BACKGROUND; (w * h * 3) as usize];
+    let lamp = V3::from(settings.lamp).normalize();
+    let mut out = vec![settings.background; (w * h * 3) as usize];
     for (i, pixel) in (0..w * h).zip(out.chunks_exact_mut(3)) {
         let Some((face, b)) = interpolate(&view, &all, &faces, &buffer, [i % w, i / w]) else {
             continue;
@@ -139,52 +172,11 @@ pub(crate) fn draw(meshes: &[DrawnMesh], turn: &Turn) -> Vec<u8> {
         let n = n.normalize();
         let n = if n.z > 0.0 { -n } else { n };
         let is_inside = face_normal(&all, &f).z > 0.0;
-        let color = meshes[mesh].color_at(own, b, is_inside);
-        let shade = AMBIENT + (1.0 - AMBIENT) * n.dot(&lamp).max(0.0);
+        let color = meshes[mesh].color_at(own, b, is_inside, &settings);
+        let shade = settings.ambient + (1.0 - settings.ambient) * n.dot(&lamp).max(0.0);
         for (out, c) in pixel.iter_mut().zip(color) {
             *out = (c * shade * 255.0).clamp(0.0, 255.0) as u8;
         }
     }
     out
-}
-
-/// A sheet of equally large pictures.
-pub(crate) struct Sheet {
-    cell: (u32, u32),
-    columns: u32,
-    rows: u32,
-    data: Vec<u8>,
-}
-
-impl Sheet {
-    /// An empty sheet.
-    pub(crate) fn new(cell: (u32, u32), columns: u32, rows: u32) -> Self {
-        Self {
-            cell,
-            columns,
-            rows,
-            data: vec![255; (columns * cell.0 * rows * cell.1 * 3) as usize],
-        }
-    }
-
-    /// Copies a picture into a cell.
-    pub(crate) fn put(&mut self, column: u32, row: u32, picture: &[u8]) {
-        let stride = (self.columns * self.cell.0 * 3) as usize;
-        let (first, bytes) = (
-            (column * self.cell.0 * 3) as usize,
-            (self.cell.0 * 3) as usize,
-        );
-        for (line, pixels) in picture.chunks_exact(bytes).enumerate() {
-            let to = ((row * self.cell.1) as usize + line) * stride + first;
-            self.data[to..to + bytes].copy_from_slice(pixels);
-        }
-    }
-
-    /// Writes the sheet and prints its path.
-    pub(crate) fn write(self, path: &std::path::Path) {
-        let (w, h) = (self.columns * self.cell.0, self.rows * self.cell.1);
-        let image = tryon::geometry::camera::ColorImage::new(w, h, self.data).expect("a picture");
-        tryon::formats::image::write_png_rgb(path, &image).expect("written");
-        println!("{}", path.display());
-    }
 }
