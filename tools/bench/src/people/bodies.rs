@@ -51,9 +51,9 @@ const AVERAGE: Recipe = Recipe {
 #[rustfmt::skip]
 const RECIPES: [Recipe; 12] = [
     Recipe { name: "old_man_belly", sex: "male", build: &[("minmuscle-averageweight", 0.6)], measures: &[("waist-circ-incr", 0.6), ("neck-circ-decr", 0.4)],
-        physique: Physique { belly: belly(0.12, 0.60, [0.16, 0.17]), scale: 0.97, stoop: 0.30, ..PLAIN }, ..AVERAGE },
+        physique: Physique { belly: belly(0.12, 0.60, [0.16, 0.17]), scale: 0.97, stoop: 0.30, ..PLAIN } },
     Recipe { name: "old_woman", sex: "female", build: &[("minmuscle-averageweight", 0.9)], measures: &[("hips-circ-incr", 0.5), ("waist-circ-incr", 0.6)],
-        physique: Physique { scale: 0.93, stoop: 0.50, ..PLAIN }, ..AVERAGE },
+        physique: Physique { scale: 0.93, stoop: 0.50, ..PLAIN } },
     Recipe { name: "very_tall", sex: "male", physique: Physique { legs: 1.08, scale: 1.12, ..PLAIN }, ..AVERAGE },
     Recipe { name: "very_short", sex: "female", physique: Physique { legs: 0.90, head: 1.08, scale: 0.89, ..PLAIN }, ..AVERAGE },
     Recipe { name: "heavy_woman", sex: "female", build: &[("averagemuscle-maxweight", 1.35)],
@@ -65,7 +65,7 @@ const RECIPES: [Recipe; 12] = [
     Recipe { name: "muscular", sex: "male", build: &[("maxmuscle-averageweight", 1.3)],
         measures: &[("shoulder-dist-incr", 0.7)], ..AVERAGE },
     Recipe { name: "child", sex: "female", build: &[("minmuscle-averageweight", 0.8)], measures: &[("hips-circ-decr", 0.8), ("bust-circ-decr", 1.0)],
-        physique: Physique { legs: 0.90, head: 1.28, scale: 0.72, ..PLAIN }, ..AVERAGE },
+        physique: Physique { legs: 0.90, head: 1.28, scale: 0.72, ..PLAIN } },
     Recipe { name: "very_thin", sex: "male", build: &[("minmuscle-minweight", 1.2)], ..AVERAGE },
     Recipe { name: "wide_coat", sex: "male", physique: Physique { covering: Some(Covering::WideCoat), ..PLAIN }, ..AVERAGE },
     Recipe { name: "long_hair", sex: "female", physique: Physique { covering: Some(Covering::LongHair), ..PLAIN }, ..AVERAGE },
