@@ -76,10 +76,14 @@ pub(crate) fn code_without_tests(source: &str) -> String {
     }
 }
 
-/// Names of the structs, enums, traits and type aliases that code declares outside its tests.
+/// Names of the structs, enums and traits that code declares outside its tests, structs of `settings!` with them.
 pub(crate) fn types(code: &str) -> Vec<String> {
     let mut names = Vec::new();
+    let mut is_settings = false;
     for line in code.lines() {
+        if !line.starts_with(' ') {
+            is_settings = line.ends_with("settings! {") || (is_settings && line != "}");
+        }
         let mut words = line.split_whitespace().peekable();
         while words
             .peek()
@@ -87,7 +91,9 @@ pub(crate) fn types(code: &str) -> Vec<String> {
         {
             words.next();
         }
-        if !matches!(words.next(), Some("struct" | "enum" | "trait")) || line.starts_with(' ') {
+        if !matches!(words.next(), Some("struct" | "enum" | "trait"))
+            || (line.starts_with(' ') && !is_settings)
+        {
             continue;
         }
         let name = words.next().unwrap_or("");
