@@ -1,7 +1,7 @@
 //! Settings structs whose fields carry their documentation and default side by side.
 
 /// Defines public settings structs with `Default` and with `serde` forms that refuse unknown fields; the caller's crate depends
-/// on `serde`.
+/// on `serde`. They are `Copy`, unless `owned:` comes first.
 ///
 /// ```
 /// tryon_geometry::settings! {
@@ -15,11 +15,15 @@
 /// ```
 #[macro_export]
 macro_rules! settings {
-    ($($(#[$doc:meta])* pub struct $name:ident {
+    (owned: $($structs:tt)*) => {
+        $crate::settings! { @define #[derive(Clone, Debug, PartialEq)] $($structs)* }
+    };
+    (@define #[$derive:meta] $($(#[$doc:meta])* pub struct $name:ident {
         $($(#[$field_doc:meta])* pub $field:ident: $type:ty = $default:expr,)*
     })*) => {$(
         $(#[$doc])*
-        #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+        #[$derive]
+        #[derive(serde::Serialize, serde::Deserialize)]
         #[serde(default, deny_unknown_fields)]
         pub struct $name {
             $($(#[$field_doc])* pub $field: $type,)*
@@ -31,4 +35,7 @@ macro_rules! settings {
             }
         }
     )*};
+    ($($structs:tt)*) => {
+        $crate::settings! { @define #[derive(Clone, Copy, Debug, PartialEq)] $($structs)* }
+    };
 }

@@ -7,7 +7,8 @@ pub(crate) mod noise;
 pub use image::{ColorImage, DepthImage, ImageError};
 pub use intrinsics::{Intrinsics, IntrinsicsError};
 pub use noise::{
-    KINECT_V1_LATERAL_SIGMA, NoiseModel, kinect_v1_axial_sigma, time_of_flight_axial_sigma,
+    KINECT_V1_LATERAL_SIGMA, NoiseModel, NoiseSettings, kinect_v1_axial_sigma,
+    time_of_flight_axial_sigma,
 };
 
 use crate::math::{Camera, ColorCamera, Rigid};

@@ -3,6 +3,7 @@
 //! Random numbers come from a counter (seed, frame, pixel): a frame's noise depends on its number only.
 
 use super::{DepthImage, Intrinsics};
+use std::f32::consts::{FRAC_PI_2, FRAC_PI_4};
 
 /// Noise model of a depth camera.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -43,7 +44,6 @@ pub fn time_of_flight_axial_sigma(z: f32, theta: f32) -> f32 {
     (frontal + 0.1 * z * z.sqrt() * t * t / ((FRAC_PI_2 - t) * (FRAC_PI_2 - t))) * 1e-3
 }
 
-const FRAC_PI_2: f32 = std::f32::consts::FRAC_PI_2;
 /// Both models go to infinity at 90°; the papers measured up to 80°.
 const MAX_ANGLE: f32 = 80.0 * std::f32::consts::PI / 180.0;
 /// Distance between projector and camera of the Kinect v1, metres (Nguyen et al. 2012, section 2).
@@ -52,13 +52,19 @@ const BASELINE: f32 = 0.075;
 const DISPARITY_STEPS: f32 = 8.0;
 /// Range of both cameras in which anything is reported, metres.
 const RANGE: [f32; 2] = [0.4, 8.0];
-/// A jump to a neighbour larger than this share of the depth is an edge: 75 mm at 1.5 m, several times the noise,
-/// less than an arm in front of a chest.
-const EDGE: f32 = 0.05;
-/// Slope (27°) up to which both models' angle terms stay below 2 % of the frontal noise: not computed there.
-const FLAT: f32 = 0.5;
-/// Share of edge pixels that are lost.
-const EDGE_LOSS: f32 = 0.5;
+
+crate::settings! {
+    /// Settings of depth edges in noise models.
+    pub struct NoiseSettings {
+        /// A jump to a neighbour larger than this share of the depth is an edge: 75 mm at 1.5 m, several times the noise,
+        /// less than an arm in front of a chest.
+        pub edge: f32 = 0.05,
+        /// Slope (27°) up to which both models' angle terms stay below 2 % of the frontal noise: not computed there.
+        pub flat: f32 = 0.5,
+        /// Share of edge pixels that are lost.
+        pub edge_loss: f32 = 0.5,
+    }
+}
 
 /// A well-mixed number from a counter (splitmix64, Steele et al. 2014).
 fn hash(mut x: u64) -> u64 {
@@ -105,6 +111,11 @@ impl NoiseModel {
         let (w, h) = (camera.width as usize, camera.height as usize);
         let stream = hash(hash(seed) ^ frame);
         let table = lateral_table();
+        let NoiseSettings {
+            edge: edge_share,
+            flat,
+            edge_loss,
+        } = NoiseSettings::default();
         let (f, half_f) = (camera.fx as f32, 0.5 * camera.fx as f32);
         // Disparity in steps: both directions cost one division.
         let steps = DISPARITY_STEPS * BASELINE * f;
@@ -138,11 +149,11 @@ impl NoiseModel {
                 let (above, below) = (clean[up + u], clean[down + u]);
                 let lo = left.min(right).min(above).min(below);
                 let hi = left.max(right).max(above).max(below);
-                let edge = hi - lo > EDGE * z;
+                let edge = hi - lo > edge_share * z;
                 // Slope of depth over metres on the surface; at an edge it means nothing.
                 let (gx, gy) = (right - left, below - above);
                 let slope2 = (gx * gx + gy * gy) * (half_f * half_f) / (z * z);
-                let theta = if edge || slope2 < FLAT * FLAT {
+                let theta = if edge || slope2 < flat * flat {
                     0.0
                 } else {
                     small_atan(slope2.sqrt())
@@ -151,7 +162,7 @@ impl NoiseModel {
                 *px = match self {
                     Self::None => millimetres(z),
                     Self::KinectV1 => {
-                        if edge && uniform(bits) < EDGE_LOSS {
+                        if edge && uniform(bits) < edge_loss {
                             continue;
                         }
                         let z = z + kinect_v1_axial_sigma(z, theta) * n;
@@ -161,11 +172,11 @@ impl NoiseModel {
                     Self::TimeOfFlight => {
                         if edge {
                             let r = uniform(bits);
-                            if r < EDGE_LOSS || hi >= RANGE[1] {
+                            if r < edge_loss || hi >= RANGE[1] {
                                 continue;
                             }
                             // Light from both sides of the edge arrives in one pixel.
-                            let mix = (r - EDGE_LOSS) / (1.0 - EDGE_LOSS);
+                            let mix = (r - edge_loss) / (1.0 - edge_loss);
                             millimetres(z + (hi - z) * mix * mix)
                         } else {
                             millimetres(z + time_of_flight_axial_sigma(z, theta) * n)
@@ -185,8 +196,7 @@ fn uniform(bits: u64) -> f32 {
 
 /// Arctangent for x ≥ 0 within 0.005 rad (Rajan et al. 2006): the models need no more.
 fn small_atan(x: f32) -> f32 {
-    const QUARTER: f32 = std::f32::consts::FRAC_PI_4;
-    let poly = |t: f32| QUARTER * t + 0.273 * t * (1.0 - t);
+    let poly = |t: f32| FRAC_PI_4 * t + 0.273 * t * (1.0 - t);
     if x <= 1.0 {
         poly(x)
     } else {

@@ -5,6 +5,7 @@ pub(crate) mod edges;
 mod editable;
 mod normals;
 pub(crate) mod remesh;
+mod settings;
 pub mod smoothing;
 pub(crate) mod topology;
 pub(crate) mod union_find;
@@ -14,6 +15,7 @@ pub use edges::{boundary_edges, boundary_loops, edge_faces, edges, sides, undire
 pub use editable::smallest_angle;
 pub use normals::{face_normal, vertex_normal, vertex_normals};
 pub use remesh::{Border, RemeshSpec, Remesher, remesh};
+pub use settings::RemeshSettings;
 pub use topology::{Csr, Edge, Topology};
 pub use union_find::UnionFind;
 

@@ -1,30 +1,10 @@
 //! Isotropic remeshing towards a target edge length (Botsch & Kobbelt 2004: split, collapse, flip, relax).
 
 use super::editable::{EditableMesh, normal, smallest_angle};
+use super::settings::RemeshSettings;
 use super::{Face, TriMesh};
 use crate::math::{P3, P3d, V3d};
 use crate::par::{self, Par};
-
-/// Edges longer than this times their target are split (same paper).
-const SPLIT: f64 = 4.0 / 3.0;
-/// Edges shorter than this times their target are collapsed (same paper).
-const COLLAPSE: f64 = 4.0 / 5.0;
-/// Smallest cosine between a face's normals before and after a collapse; larger keeps more folds and more short edges.
-const COLLAPSE_TURN: f64 = 0.3;
-/// A flip may not make the smallest angle worse than this share of it.
-const FLIP_KEEPS: f64 = 0.6;
-/// Sine of a smallest angle below which a flip need not improve valences …
-const FLIP_POOR: f64 = 0.3;
-/// … if it improves that sine by this factor.
-const FLIP_GAIN: f64 = 1.3;
-/// Smallest cosine between the normals beside a flipped edge and after it (60°).
-const FLIP_TURN: f64 = 0.5;
-/// Smallest cosine between the normals beside a flipped edge where creases are kept (46°).
-const FLIP_CREASE: f64 = 0.7;
-/// A vertex lies on a crease where its faces' normals sum to less than this share of their lengths: nothing to slide in.
-const RELAX_CREASE: f64 = 0.8;
-/// Distance from the mirror plane that an inner vertex keeps, over its target edge length.
-const OFF_PLANE: f64 = 0.1;
 
 /// Faces around a vertex that is not on the border, at least, and ideal numbers inside and on the border.
 const LEAST_FACES: usize = 3;
@@ -58,6 +38,7 @@ pub struct RemeshSpec<'a> {
 /// A mesh while it is remeshed.
 pub struct Remesher<'a> {
     spec: RemeshSpec<'a>,
+    settings: RemeshSettings,
     mesh: EditableMesh,
     /// Target edge length at each vertex, metres.
     sizes: Vec<f64>,
@@ -83,6 +64,7 @@ impl<'a> Remesher<'a> {
         };
         Self {
             spec,
+            settings: RemeshSettings::default(),
             mesh,
             sizes,
             border,
@@ -115,7 +97,11 @@ impl<'a> Remesher<'a> {
 
     /// Splits long edges in the middle, the longest first.
     pub fn split(&mut self) {
-        for [a, b] in self.by_stretch(|s| s > SPLIT).into_iter().rev() {
+        for [a, b] in self
+            .by_stretch(|s| s > self.settings.split)
+            .into_iter()
+            .rev()
+        {
             let open = self.mesh.edge_faces(a, b).len() == 1;
             let [p, q] = [a, b].map(|v| self.mesh.points[v as usize]);
             let mut middle = nalgebra::center(&p, &q);
@@ -136,9 +122,9 @@ impl<'a> Remesher<'a> {
 
     /// Collapses short edges, the shortest first.
     pub fn collapse(&mut self) {
-        for [a, b] in self.by_stretch(|s| s < COLLAPSE) {
+        for [a, b] in self.by_stretch(|s| s < self.settings.collapse) {
             let shared = self.mesh.edge_faces(a, b);
-            if shared.is_empty() || self.stretch(a, b) >= COLLAPSE {
+            if shared.is_empty() || self.stretch(a, b) >= self.settings.collapse {
                 continue;
             }
             // The border keeps its vertices; an inner edge between two of them must stay.
@@ -186,7 +172,7 @@ impl<'a> Remesher<'a> {
         around.all(|&v| {
             let length = (self.mesh.points[v as usize] - to.0).norm();
             let opposite = shared.iter().any(|f| self.mesh.has_corner(*f, v));
-            length <= SPLIT * 0.5 * (to.1 + self.sizes[v as usize])
+            length <= self.settings.split * 0.5 * (to.1 + self.sizes[v as usize])
                 && !(opposite && self.mesh.around[v as usize].len() <= least(v))
         })
     }
@@ -206,7 +192,8 @@ impl<'a> Remesher<'a> {
                 .for_each(|k| after[k] = *p);
             let (n0, n1) = (normal(before), normal(after));
             n1.norm() == 0.0
-                || n0.norm() > 0.0 && n0.dot(&n1) < COLLAPSE_TURN * n0.norm() * n1.norm()
+                || n0.norm() > 0.0
+                    && n0.dot(&n1) < self.settings.collapse_turn * n0.norm() * n1.norm()
         })
     }
 
@@ -233,8 +220,9 @@ impl<'a> Remesher<'a> {
             p.min(q)
         };
         let (q0, q1) = (worst(&flip.before), worst(&flip.after));
+        let s = &self.settings;
         let better =
-            after < before && q1 > FLIP_KEEPS * q0 || q0 < FLIP_POOR && q1 > FLIP_GAIN * q0;
+            after < before && q1 > s.flip_keeps * q0 || q0 < s.flip_poor && q1 > s.flip_gain * q0;
         let least = |v: u32| match self.border[v as usize] {
             true => least_faces(self.spec.border) as i32,
             false => LEAST_FACES as i32,
@@ -243,13 +231,14 @@ impl<'a> Remesher<'a> {
             return false;
         }
         let [n0, n1] = flip.before.map(|f| normal(self.mesh.corners(&f)));
-        if self.spec.keep_creases && n0.dot(&n1) < FLIP_CREASE * n0.norm() * n1.norm() {
+        if self.spec.keep_creases && n0.dot(&n1) < self.settings.flip_crease * n0.norm() * n1.norm()
+        {
             return false;
         }
         let sum = n0 + n1;
         flip.after.iter().all(|f| {
             let n = normal(self.mesh.corners(f));
-            n.dot(&sum) > FLIP_TURN * n.norm() * sum.norm()
+            n.dot(&sum) > self.settings.flip_turn * n.norm() * sum.norm()
         })
     }
 
@@ -289,7 +278,7 @@ impl<'a> Remesher<'a> {
                 weight += w;
             }
         }
-        if self.spec.keep_creases && (area == 0.0 || n.norm() < RELAX_CREASE * area) {
+        if self.spec.keep_creases && (area == 0.0 || n.norm() < self.settings.relax_crease * area) {
             return p;
         }
         let mut step = V3d::zeros();
@@ -304,7 +293,7 @@ impl<'a> Remesher<'a> {
             q.x = if border {
                 0.0
             } else {
-                q.x.max(OFF_PLANE * self.sizes[i])
+                q.x.max(self.settings.off_plane * self.sizes[i])
             };
         }
         (self.spec.project)(&q)
@@ -332,8 +321,6 @@ impl<'a> Remesher<'a> {
 
 /// Rounds of split, collapse, flip and relax in [`remesh`]; more change little (same paper: 5 to 10).
 const ROUNDS: usize = 5;
-/// Share of the way to the centroid per relaxation in [`remesh`].
-const RELAXATION: f64 = 0.5;
 
 /// The same open or closed surface with edges of about `target` metres.
 ///
@@ -345,7 +332,7 @@ pub fn remesh(mesh: &TriMesh, target: f64) -> TriMesh {
         border: Border::Rim,
         graded: false,
         keep_creases: true,
-        relaxation: RELAXATION,
+        relaxation: 0.5,
     };
     let points = mesh.vertices().iter().map(|p| p.cast()).collect();
     let mut remesher = Remesher::new(points, mesh.faces().to_vec(), spec);

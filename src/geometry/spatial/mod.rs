@@ -7,6 +7,7 @@ mod hash_grid;
 pub(crate) mod intersections;
 mod kdtree;
 pub(crate) mod organised;
+mod settings;
 mod triangle;
 pub(crate) mod warm_query;
 
@@ -17,5 +18,6 @@ pub use hash_grid::HashGrid;
 pub use intersections::{Intersection, SelfIntersections, intersections};
 pub use kdtree::PointTree;
 pub use organised::{Label, OrganisedCloud};
+pub use settings::CellSettings;
 pub use triangle::closest_on_triangle;
 pub use warm_query::WarmQuery;

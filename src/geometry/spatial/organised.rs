@@ -4,6 +4,7 @@
 //! belong to the same surface. Each cell has a class (person, background, no reading), so that "no reading"
 //! never passes for "empty space".
 
+use super::settings::CellSettings;
 use crate::camera::{DepthImage, Intrinsics};
 use crate::math::{P3, V3};
 
@@ -24,18 +25,6 @@ pub enum Label {
     Person,
 }
 
-/// A focal length of this many cells keeps about 1,500 cells on a person who fills the height of the image; twice as
-/// many changed the joint error by less than 0.3 mm and doubled the time (docs/benchmarks/tracking.md).
-const CELLS_PER_FOCAL_LENGTH: f64 = 131.25;
-
-/// Readings of one cell belong together when they are within this distance (metres) plus [`SAME_SURFACE_SLOPE`] × z.
-const SAME_SURFACE: f32 = 0.02;
-/// See [`SAME_SURFACE`]; depth noise of structured light grows to a few per cent of the distance at 4 m.
-const SAME_SURFACE_SLOPE: f32 = 0.006;
-
-/// Neighbouring cells farther apart in depth than this (metres) lie on different surfaces.
-const DISCONTINUITY: f32 = 0.06;
-
 /// Readings of one cell support each other within their depth over this (2 %) plus [`SUPPORT`]: steep surfaces included.
 const SUPPORT_SLOPE: u16 = 50;
 /// See [`SUPPORT_SLOPE`], millimetres.
@@ -44,10 +33,6 @@ const SUPPORT: u16 = 20;
 /// Filled cells per cell that misses two or three of its four probes, at or below which an image is thin. The outlines
 /// of a subject alone give one in five.
 const THIN: usize = 3;
-
-/// A cell whose averaged depth is this far from its first reading (metres) was labelled by a corrupt pixel
-/// and is given up.
-const MISLED: f32 = 0.25;
 
 /// True for two readings of one cell (millimetres) that support each other.
 fn agree(a: u16, b: u16) -> bool {
@@ -79,6 +64,7 @@ pub struct OrganisedCloud {
     c: [f32; 2],
     /// Depth of each cell, metres; 0 = no reading.
     pub depth: Vec<f32>,
+    settings: CellSettings,
     /// Most pixels have no reading: one reading without support is enough for a cell.
     thin: bool,
     /// Class of each cell.
@@ -92,7 +78,8 @@ pub struct OrganisedCloud {
 impl OrganisedCloud {
     /// An empty grid for a camera; `stride` in pixels, or `None` for the default.
     pub fn new(camera: &Intrinsics, stride: Option<u32>) -> Self {
-        let (stride, (f, c, (columns, rows))) = Self::layout(camera, stride);
+        let settings = CellSettings::default();
+        let (stride, (f, c, (columns, rows))) = Self::layout(&settings, camera, stride);
         let n = columns as usize * rows as usize;
         Self {
             stride,
@@ -100,6 +87,7 @@ impl OrganisedCloud {
             rows,
             f,
             c,
+            settings,
             thin: false,
             depth: vec![0.0; n],
             labels: vec![Label::Unknown; n],
@@ -109,7 +97,7 @@ impl OrganisedCloud {
     }
     /// True for a grid made for that camera and stride.
     pub fn fits(&self, camera: &Intrinsics, stride: Option<u32>) -> bool {
-        let (s, focal) = Self::layout(camera, stride);
+        let (s, focal) = Self::layout(&self.settings, camera, stride);
         self.stride == s
             && self.f == focal.0
             && self.c == focal.1
@@ -117,9 +105,15 @@ impl OrganisedCloud {
     }
     /// Stride, and focal lengths, centre and size in cells.
     #[allow(clippy::type_complexity)] // three pairs of numbers, used twice below
-    fn layout(camera: &Intrinsics, stride: Option<u32>) -> (u32, ([f32; 2], [f32; 2], (u32, u32))) {
+    fn layout(
+        settings: &CellSettings,
+        camera: &Intrinsics,
+        stride: Option<u32>,
+    ) -> (u32, ([f32; 2], [f32; 2], (u32, u32))) {
         let focal = camera.fx.min(camera.fy);
-        let automatic = (focal / CELLS_PER_FOCAL_LENGTH).round().clamp(1.0, 16.0) as u32;
+        let automatic = (focal / settings.cells_per_focal_length)
+            .round()
+            .clamp(1.0, 16.0) as u32;
         let stride = stride
             .unwrap_or(automatic)
             .clamp(1, camera.width.min(camera.height).max(1));
@@ -260,6 +254,7 @@ impl OrganisedCloud {
     pub fn refine(&mut self, image: &DepthImage, cells: &[u32]) -> usize {
         let (s, w) = (self.stride as usize, image.width() as usize);
         let data = image.data();
+        let settings = self.settings;
         // A quarter of the pixels must agree; a single pixel is all there is at stride 1.
         let support = if self.thin {
             1
@@ -274,7 +269,7 @@ impl OrganisedCloud {
                 (cell / self.columns as usize) * s,
             );
             let mean_about = |reference: f32| {
-                let tolerance = SAME_SURFACE + SAME_SURFACE_SLOPE * reference;
+                let tolerance = settings.same_surface + settings.same_surface_slope * reference;
                 let (lo, hi) = (
                     ((reference - tolerance) * 1e3).max(1.0) as u16,
                     ((reference + tolerance) * 1e3) as u16,
@@ -309,7 +304,7 @@ impl OrganisedCloud {
                 self.points[cell] = P3::origin();
                 continue;
             }
-            if (sum as f32 / n as f32 * 1e-3 - self.depth[cell]).abs() > MISLED {
+            if (sum as f32 / n as f32 * 1e-3 - self.depth[cell]).abs() > settings.misled {
                 self.depth[cell] = 0.0;
                 self.points[cell] = P3::origin();
                 continue;
@@ -343,7 +338,7 @@ impl OrganisedCloud {
             let k = self.cell(u + du, v + dv)?;
             let same = self.labels[k] == Label::Person
                 && self.depth[k] > 0.0
-                && (self.depth[k] - z).abs() < DISCONTINUITY;
+                && (self.depth[k] - z).abs() < self.settings.discontinuity;
             same.then(|| self.points[k])
         };
         let here = self.points[cell];
