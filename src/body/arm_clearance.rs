@@ -6,19 +6,15 @@
 use crate::parts::{
     BodyPart, EllipticColumn, EllipticSection, LimbJoints, TrunkFrame, mean_radius,
 };
+use crate::settings::ArmClearanceSettings;
 use crate::{BoneTransforms, Pose, RestBody, Template};
 use nalgebra::UnitQuaternion;
 use tryon_geometry::math::{P3d, V3d, exp_so3, log_so3};
 
 /// Bands of the trunk between pelvis and shoulders, 6 cm each: waist and chest differ.
 const BANDS: usize = 8;
-/// Points of the upper arm, as shares of the bone: armpits are no overlap, and elbows and forearms, turned out too, would
-/// leave the picture's arms.
-const UPPER: [f64; 2] = [0.4, 0.6];
 /// Turns of the shoulder, each by the deepest point to first order: the third is below a millimetre.
 const TURNS: usize = 3;
-/// Largest turn of a shoulder, radians: an arm through the chest is a fault of tracking, and stays.
-const MOST_TURN: f64 = 0.35;
 
 /// One upper arm: the joints at its ends, and its radius, metres.
 #[derive(Clone, Copy, Debug)]
@@ -30,6 +26,7 @@ struct UpperArm {
 /// Trunk and arms of one rest body.
 #[derive(Clone, Debug)]
 pub struct ArmClearance {
+    settings: ArmClearanceSettings,
     arms: [UpperArm; 2],
     /// Section of each band, metres.
     sections: [EllipticSection; BANDS],
@@ -50,6 +47,7 @@ impl ArmClearance {
             }
         });
         Some(Self {
+            settings: ArmClearanceSettings::default(),
             sections: sections(template, rest, &frame),
             arms,
         })
@@ -82,8 +80,8 @@ impl ArmClearance {
                 };
                 turn = more * turn;
                 let angle = turn.angle();
-                if angle > MOST_TURN {
-                    turn = UnitQuaternion::identity().slerp(&turn, MOST_TURN / angle);
+                if angle > self.settings.most_turn {
+                    turn = UnitQuaternion::identity().slerp(&turn, self.settings.most_turn / angle);
                 }
                 let local = parent.inverse() * turn * parent * before;
                 let at = skeleton.dof_offset(root);
@@ -102,7 +100,7 @@ impl ArmClearance {
         bones: &BoneTransforms,
     ) -> Option<UnitQuaternion<f64>> {
         let [root, hinge] = [arm.joints.root, arm.joints.hinge].map(|j| bones.joints[j]);
-        let points = UPPER.map(|t| root + (hinge - root) * t);
+        let points = self.settings.upper.map(|t| root + (hinge - root) * t);
         let pushes = points.iter();
         let pushes = pushes.filter_map(|p| Some((p - root, self.push(frame, p, arm.radius)?)));
         let (lever, push) = pushes.max_by(|a, b| a.1.norm().total_cmp(&b.1.norm()))?;

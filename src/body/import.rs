@@ -13,10 +13,6 @@ use tryon_geometry::mesh::TriMesh;
 const BENT: f64 = 0.25;
 /// Overstretching of elbows and knees, radians: hypermobility, and rest joints off by a few mm.
 const OVERSTRETCH: f64 = 0.1;
-/// Flexion of elbow and knee, radians from straight (about 150° and 145°; clinical ranges of motion, AAOS 1965).
-const ELBOW_FLEXION: f64 = 2.62;
-/// See [`ELBOW_FLEXION`].
-const KNEE_FLEXION: f64 = 2.53;
 
 /// Builds a template from the arrays of an SMPL-layout body.
 ///
@@ -197,11 +193,12 @@ fn motion(k: usize, arrays: &SmplArrays, rest: &[Point3<f64>]) -> JointMotion {
         limits: [x, mirrored(y), mirrored(z)],
     };
     let even = |r: f64| [-r, r];
+    // Elbows flex by about 150°, knees by 145° from straight (clinical ranges of motion, AAOS 1965).
     match part {
         "pelvis" => JointMotion::Fixed,
         // Flexion is forward: −x. Abduction of the left leg: +z.
         "hip" => ball([-2.3, 0.8], even(1.0), [-0.7, 1.2]),
-        "knee" => hinge(k, arrays, rest, -Vector3::z(), KNEE_FLEXION),
+        "knee" => hinge(k, arrays, rest, -Vector3::z(), 2.53),
         "ankle" => ball([-0.7, 1.0], even(0.6), even(0.6)),
         "foot" => JointMotion::Hinge {
             axis: [1.0, 0.0, 0.0],
@@ -211,7 +208,7 @@ fn motion(k: usize, arrays: &SmplArrays, rest: &[Point3<f64>]) -> JointMotion {
         "neck" | "head" => ball(even(0.7), even(0.8), even(0.6)),
         "collar" => ball(even(0.3), even(0.5), even(0.6)),
         "shoulder" => ball(even(2.4), even(2.4), even(2.6)),
-        "elbow" => hinge(k, arrays, rest, Vector3::z(), ELBOW_FLEXION),
+        "elbow" => hinge(k, arrays, rest, Vector3::z(), 2.62),
         "wrist" => ball(even(1.5), even(1.2), even(1.2)),
         "hand" => JointMotion::Fixed,
         _ => ball(even(1.5), even(1.5), even(1.5)),

@@ -35,6 +35,7 @@ mod pose;
 mod pose_offsets;
 mod pose_shapes;
 mod rig;
+pub mod settings;
 mod shape;
 mod shape_space;
 mod skeleton;

@@ -1,5 +1,6 @@
 //! Rigging of a bare mesh: joints and skinning weights from a template that has been fitted to it.
 
+use super::settings::RigSettings;
 use super::{
     BodyError, BoneTransforms, Joint, JointMotion, RestBody, Skeleton, SkinSearch, SkinWeights,
     Template,
@@ -11,12 +12,6 @@ use tryon_geometry::mesh::smoothing::mean;
 use tryon_geometry::mesh::{Topology, TriMesh, vertex_normals};
 use tryon_geometry::par::Par;
 
-/// Template vertices further than this from a mesh vertex lend it no weights, metres. A template on the mesh is within
-/// 5 cm even where hair or shoes stand off.
-const REACH: f32 = 0.15;
-/// Share of [`REACH`] by which both skins are shifted along their normals before the search: it keeps the other side of
-/// a limb further away.
-const SHIFT: f32 = 0.3;
 /// Passes of smoothing of the weights: nearest vertices jump, skin bends gradually.
 const SMOOTHING: usize = 4;
 
@@ -75,12 +70,13 @@ fn nearest_weights(
     template: &Template,
     fitted: &RestBody,
 ) -> Result<Vec<Vec<f64>>, BodyError> {
-    let skin = SkinSearch::new(template, &fitted.vertices, REACH * SHIFT);
+    let settings = RigSettings::default();
+    let skin = SkinSearch::new(template, &fitted.vertices, settings.reach * settings.shift);
     let mut normals = Vec::new();
     let (vertices, around) = (mesh.vertices(), topology.vertex_faces());
     vertex_normals(Par::Seq, vertices, mesh.faces(), around, &mut normals);
     let row = |(vertex, (p, normal)): (usize, (&P3, &V3))| {
-        let Some((near, _)) = skin.nearest(p, normal, REACH) else {
+        let Some((near, _)) = skin.nearest(p, normal, settings.reach) else {
             return Err(BodyError::Vertex {
                 vertex,
                 why: "no part of the fitted template is near it".into(),

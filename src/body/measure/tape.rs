@@ -1,6 +1,7 @@
 //! Girths around a body and lengths between its joints.
 
 use super::section::{LevelSlabs, SLICE, Section, first_exit, section};
+use crate::settings::TapeSettings;
 use crate::{RestBody, Template};
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
@@ -50,27 +51,6 @@ pub enum MeasureError {
     Section(&'static str),
 }
 
-/// Navel between hip joints (0) and neck joint (1): omphalion 1.017 m at a stature of 1.692 m, ANSUR II means.
-const NAVEL: f64 = 0.24;
-/// Range of the narrowest part of the trunk, in the same measure.
-const WAIST_BETWEEN: [f64; 2] = [0.16, 0.5];
-/// The acromion lies above and a little outside the shoulder joint, 30° from the vertical (tangent).
-const ACROMION_LEAN: f64 = 0.577;
-/// Lowest height of the fullest part of the chest, in the same measure.
-const LOWER_CHEST: f64 = 0.55;
-/// The trunk's outline ends within this times the shoulder joints' half breadth where arms are apart from it.
-const TRUNK_BREADTH: f64 = 1.25;
-/// Highest level of the seat above the hip joints, metres.
-const SEAT_ABOVE: f64 = 0.06;
-/// Level of the thigh below the crotch, metres.
-const THIGH_BELOW: f64 = 0.02;
-/// Range of the calf: below the knee and above the ankle, metres.
-const CALF: [f64; 2] = [0.05, 0.1];
-/// Shares of the way from neck to head at which the neck is thinnest.
-const NECK: [f64; 3] = [0.35, 0.5, 0.65];
-/// Shares of the way along upper arm and forearm of the biceps and the wrist.
-const BICEPS: f64 = 0.55;
-const WRIST: f64 = 0.97;
 /// Halvings of [`SLICE`] to find the crotch within a tenth of a millimetre.
 const HALVINGS: usize = 6;
 
@@ -121,6 +101,7 @@ impl MeasureLandmarks {
 struct Tape<'a> {
     template: &'a Template,
     body: &'a RestBody,
+    settings: TapeSettings,
     levels: LevelSlabs<'a>,
     at: MeasureLandmarks,
 }
@@ -178,41 +159,54 @@ impl Tape<'_> {
     fn chest(&self) -> Option<f64> {
         let half = self.at.shoulder.x - self.at.middle.x;
         let apart = |s: &Section| {
-            s.central()
-                .is_some_and(|o| o.iter().all(|p| p.x.abs() < TRUNK_BREADTH * half))
+            s.central().is_some_and(|o| {
+                o.iter()
+                    .all(|p| p.x.abs() < self.settings.trunk_breadth * half)
+            })
         };
-        heights(self.at.trunk_height(LOWER_CHEST), self.at.shoulder.y)
-            .map(|y| self.trunk(y))
-            .take_while(apart)
-            .filter_map(|s| s.girth())
-            .reduce(f64::max)
+        heights(
+            self.at.trunk_height(self.settings.lower_chest),
+            self.at.shoulder.y,
+        )
+        .map(|y| self.trunk(y))
+        .take_while(apart)
+        .filter_map(|s| s.girth())
+        .reduce(f64::max)
     }
     /// Smallest girth of the trunk between seat and chest, at most `waist`.
     fn natural_waist(&self, waist: f64) -> f64 {
-        let [low, high] = WAIST_BETWEEN.map(|t| self.at.trunk_height(t));
+        let [low, high] = self.settings.waist_between.map(|t| self.at.trunk_height(t));
         heights(low, high)
             .filter_map(|y| self.trunk(y).girth())
             .fold(waist, f64::min)
     }
     fn seat(&self, crotch: f64) -> f64 {
-        heights(crotch + 2.0 * SLICE, self.at.middle.y + SEAT_ABOVE)
-            .filter_map(|y| self.trunk(y).girth())
-            .fold(0.0, f64::max)
+        heights(
+            crotch + 2.0 * SLICE,
+            self.at.middle.y + self.settings.seat_above,
+        )
+        .filter_map(|y| self.trunk(y).girth())
+        .fold(0.0, f64::max)
     }
     fn calf(&self) -> f64 {
-        heights(self.at.knee.y - CALF[0], self.at.ankle.y + CALF[1])
-            .filter_map(|y| self.leg(y).girth())
-            .fold(0.0, f64::max)
+        heights(
+            self.at.knee.y - self.settings.calf[0],
+            self.at.ankle.y + self.settings.calf[1],
+        )
+        .filter_map(|y| self.leg(y).girth())
+        .fold(0.0, f64::max)
     }
     fn neck(&self) -> Option<f64> {
-        NECK.iter()
+        self.settings
+            .neck
+            .iter()
             .filter_map(|&t| self.across(&self.at.neck, &self.at.head, t))
             .reduce(f64::min)
     }
     /// Distance between the points of the shoulders.
     fn shoulder_width(&self) -> Option<f64> {
         let acromion = |j: &P3d, out: f64| {
-            let d = V3d::new(out * ACROMION_LEAN, 1.0, 0.0).normalize();
+            let d = V3d::new(out * self.settings.acromion_lean, 1.0, 0.0).normalize();
             let faces = self.template.mesh().faces();
             first_exit(&self.body.vertices, faces, j, &d).map(|t| j + d * t)
         };
@@ -233,20 +227,22 @@ pub fn measure(template: &Template, body: &RestBody) -> Result<Measurements, Mea
         .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), p| {
             (l.min(f64::from(p.y)), h.max(f64::from(p.y)))
         });
+    let settings = TapeSettings::default();
     let tape = Tape {
         template,
         body,
+        settings,
         levels: LevelSlabs::new(v, template.mesh().faces(), low, high),
         at,
     };
     let at = &tape.at;
     let missing = MeasureError::Section;
     let crotch = tape.crotch().ok_or(missing("crotch"))?;
-    let waist = tape.trunk(at.trunk_height(NAVEL)).girth();
+    let waist = tape.trunk(at.trunk_height(settings.navel)).girth();
     let waist = waist.ok_or(missing("waist"))?;
-    let thigh = tape.leg(crotch - THIGH_BELOW).girth();
-    let upper_arm = tape.across(&at.shoulder, &at.elbow, BICEPS);
-    let wrist = tape.across(&at.elbow, &at.wrist, WRIST);
+    let thigh = tape.leg(crotch - settings.thigh_below).girth();
+    let upper_arm = tape.across(&at.shoulder, &at.elbow, settings.biceps);
+    let wrist = tape.across(&at.elbow, &at.wrist, settings.wrist);
     Ok(Measurements {
         stature: high - low,
         chest: tape.chest().ok_or(missing("chest"))?,

@@ -2,10 +2,9 @@
 
 use super::BodyPart;
 use crate::Template;
+use std::f64::consts::SQRT_2;
 use tryon_geometry::math::{P3, P3d, V3d};
 
-/// Half axis of an ellipse over the standard deviation of points on it.
-const HALF_AXIS: f64 = std::f64::consts::SQRT_2;
 /// Share of the way from axis to surface within which the direction out isn't known.
 const AXIS: f64 = 1e-3;
 
@@ -73,7 +72,8 @@ impl EllipticSection {
         let half = |k: usize| {
             let centre = mean(k);
             let variance = points.iter().map(|p| (p[k] - centre).powi(2)).sum::<f64>() / n;
-            HALF_AXIS * variance.sqrt()
+            // Of an ellipse, over the standard deviation of points on it.
+            SQRT_2 * variance.sqrt()
         };
         Self {
             half: [half(0), half(2)],
