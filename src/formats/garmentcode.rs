@@ -1,14 +1,11 @@
 //! GarmentCode's sewing patterns (Korosteleva & Sorkine-Hornung 2023): `*_specification.json`, unprocessed.
 
 use super::FormatError;
-use super::image::read_limited;
 use serde::Deserialize;
 use serde_json::Value;
 use std::collections::BTreeMap;
 use std::path::Path;
 
-/// Largest file, bytes; the shared examples have 20 to 60 kB.
-const MAX_BYTES: u64 = 16 << 20;
 /// Largest coordinate, metres.
 const MAX_COORDINATE: f64 = 10.0;
 /// Largest coordinate of a control point, in lengths of its edge.
@@ -92,17 +89,6 @@ struct JsonEdge {
 struct JsonStitch {
     panel: String,
     edge: usize,
-}
-
-/// Reads a pattern file.
-///
-/// # Errors
-/// As [`parse_garmentcode`], or when the file cannot be read.
-pub fn read_garmentcode(path: &Path) -> Result<RawPattern, FormatError> {
-    let bytes = read_limited(path, MAX_BYTES)?;
-    let text = String::from_utf8(bytes)
-        .map_err(|_| FormatError::field(path, "text", "it is not UTF-8"))?;
-    parse_garmentcode(&text, path)
 }
 
 /// True for the JSON text of a GarmentCode pattern (and not of this product).

@@ -1,14 +1,11 @@
 //! Patterns from GarmentCode: panels in the frames of their places on the body, landmark edges by name.
 
+use super::settings::ImportSettings;
 use crate::{
     Anchor, Curve, GarmentError, GarmentKind, Material, Panel, PanelEdge, Pattern, Placement, Seam,
     Side, Size,
 };
 use tryon_formats::garmentcode::{RawCurve, RawEdge, RawPanel, RawPattern};
-
-/// Length below which an edge is removed together with its partner in a seam, metres: such edges come from seam
-/// arithmetic and give triangles a tenth as wide as the mesh.
-const SHORTEST: f64 = 0.009;
 
 /// Converts a pattern. `size` is that of the figure it was drafted for.
 ///
@@ -20,12 +17,13 @@ pub fn from_garmentcode(
     size: Size,
     material: Material,
 ) -> Result<Pattern, GarmentError> {
+    let settings = ImportSettings::default();
     let places = raw
         .panels
         .iter()
         .map(place)
         .collect::<Result<Vec<_>, _>>()?;
-    let dropped = short_edges(raw);
+    let dropped = short_edges(raw, settings.shortest_edge);
     let heights = Heights::new(raw, &places);
     let mut panels = Vec::new();
     // Name of each raw edge; `None` if removed.
@@ -70,8 +68,8 @@ pub fn from_garmentcode(
         }
         _ => GarmentKind::Trousers,
     };
-    let anchors = anchors(&panels, &seams, trunk);
-    let finished = girths(&panels, trunk);
+    let anchors = anchors(&panels, &seams, trunk, settings.near_top);
+    let finished = girths(&panels, trunk, settings.girth_levels);
     let pattern = Pattern {
         name: name.to_owned(),
         kind,
@@ -167,12 +165,12 @@ impl Heights {
     }
 }
 
-/// True for edges to remove: short, and sewn to a short one or to none. Shape `[panels][edges]`.
-fn short_edges(raw: &RawPattern) -> Vec<Vec<bool>> {
+/// True for edges to remove: shorter than `shortest` (metres), and sewn to a short one or to none. Shape `[panels][edges]`.
+fn short_edges(raw: &RawPattern, shortest: f64) -> Vec<Vec<bool>> {
     let short = |p: usize, e: usize| {
         let panel = &raw.panels[p];
         let [a, b] = panel.edges[e].ends.map(|v| panel.vertices[v]);
-        (a[0] - b[0]).hypot(a[1] - b[1]) < SHORTEST
+        (a[0] - b[0]).hypot(a[1] - b[1]) < shortest
     };
     let mut out: Vec<Vec<bool>> = raw
         .panels
@@ -417,8 +415,8 @@ fn unnamed_edge(panel: &Panel, raw_edge: usize) -> Option<usize> {
     panel.edge(&format!("edge_{raw_edge}"))
 }
 
-/// Anchors: the front shoulder seams of tops, the free upper edges of other garments.
-fn anchors(panels: &[Panel], seams: &[Seam], trunk: bool) -> Vec<Anchor> {
+/// Anchors: the front shoulder seams of tops, the free upper edges of other garments, within `near_top` metres of their panels' tops.
+fn anchors(panels: &[Panel], seams: &[Seam], trunk: bool, near_top: f64) -> Vec<Anchor> {
     if trunk {
         let edges = panels
             .iter()
@@ -431,15 +429,13 @@ fn anchors(panels: &[Panel], seams: &[Seam], trunk: bool) -> Vec<Anchor> {
             strength: 0.5,
         }];
     }
-    /// Largest distance of a waist edge from the top of its panel, metres.
-    const NEAR_TOP: f64 = 0.04;
     let mut edges = Vec::new();
     for p in panels {
         let top = p.edges.iter().map(|e| e.from[1]).fold(f64::MIN, f64::max);
         for (i, e) in p.edges.iter().enumerate() {
             let here = [p.name.clone(), e.name.clone()];
             let sewn = seams.iter().any(|s| s.a == here || s.b == here);
-            if !sewn && e.from[1] > top - NEAR_TOP && p.end(i)[1] > top - NEAR_TOP {
+            if !sewn && e.from[1] > top - near_top && p.end(i)[1] > top - near_top {
                 edges.push(here);
             }
         }
@@ -451,8 +447,8 @@ fn anchors(panels: &[Panel], seams: &[Seam], trunk: bool) -> Vec<Anchor> {
     }]
 }
 
-/// Girths at chest, waist and hip, the sums of panel widths, metres; 0 without cloth.
-fn girths(panels: &[Panel], trunk: bool) -> [f64; 3] {
+/// Girths at chest, waist and hip, the sums of panel widths at these heights, metres; 0 without cloth.
+fn girths(panels: &[Panel], trunk: bool, levels: [f64; 3]) -> [f64; 3] {
     let width = |p: &Panel, y: f64| {
         let points: Vec<[f64; 2]> = (0..p.edges.len())
             .flat_map(|i| p.edges[i].sample(p.end(i), 8).into_iter().take(8))
@@ -477,13 +473,11 @@ fn girths(panels: &[Panel], trunk: bool) -> [f64; 3] {
     let is_trunk = |p: Placement| matches!(p, Placement::TrunkFront | Placement::TrunkBack);
     let is_skirt = |p: Placement| matches!(p, Placement::SkirtFront | Placement::SkirtBack);
     let is_leg = |p: Placement| matches!(p, Placement::LegFront(_) | Placement::LegBack(_));
-    /// Heights of the girths, metres: under the armpit (from the shoulder point), waistband and hip line (from the waist).
-    const LEVELS: [f64; 3] = [-0.26, -0.01, -0.19];
     let chest = if trunk {
-        around(&is_trunk, LEVELS[0])
+        around(&is_trunk, levels[0])
     } else {
         0.0
     };
     let lower = |y: f64| around(&is_skirt, y).max(around(&is_leg, y));
-    [chest, lower(LEVELS[1]), lower(LEVELS[2])]
+    [chest, lower(levels[1]), lower(levels[2])]
 }

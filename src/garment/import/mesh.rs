@@ -1,5 +1,6 @@
 //! Mesh garments: rest shape from texture coordinates in metres, or from the triangles in space.
 
+use super::settings::ImportSettings;
 use crate::flat_triangle::{rest_area, smallest_angle, unfold};
 use crate::{GarmentError, GarmentKind, GarmentMesh, Material, Region, RenderMesh, Size};
 use std::collections::BTreeSet;
@@ -23,10 +24,6 @@ pub struct ImportedMesh {
     pub flat: bool,
 }
 
-/// Largest relative deviation of the median edge of a flat rest shape from its length in space.
-const SAME_SCALE: f64 = 0.05;
-/// The same for the quartiles of the edges.
-const ISOMETRIC: f64 = 0.25;
 /// Smallest area of a rest triangle, m²; smaller ones are refused.
 const SMALLEST: f64 = 1e-9;
 /// Iterations of opening stitches, one at each improper vertex.
@@ -184,8 +181,10 @@ fn flat_rest(sewn: &SewnObj) -> Option<Vec<[[f64; 2]; 3]>> {
                 / (p[1] - p[0]).norm().max(f64::MIN_POSITIVE)
         })
         .collect();
+    let settings = ImportSettings::default();
+    let [scale, isometric] = [settings.same_scale, settings.isometric];
     let mut at = |share| percentile(&mut ratio, share).map(|r| (r - 1.0).abs());
-    (at(50)? < SAME_SCALE && at(25)? < ISOMETRIC && at(75)? < ISOMETRIC).then_some(rest)
+    (at(50)? < scale && at(25)? < isometric && at(75)? < isometric).then_some(rest)
 }
 
 /// Vertices welded along stitches.

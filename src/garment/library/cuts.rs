@@ -29,7 +29,7 @@ settings! {
             drop: [0.085, 0.020],
             scye: 0.125,
             longer: 0.04,
-            sleeve: Some(SleeveCut { ease: 0.12, length: None, cuff: 0.50 }),
+            sleeve: Some(SleeveCut { ease: 0.12, length: None, cuff: 0.50, ..SleeveCut::default() }),
             hood: Some(HoodCut::default()),
             ..TopCut::default()
         },
@@ -76,6 +76,8 @@ settings! {
         pub length: Option<f64> = Some(0.215),
         /// Width at the cuff over width at the underarm; long sleeves wider than half slide to the elbow.
         pub cuff: f64 = 0.93,
+        /// Length of a sleeve cap over that of the armhole.
+        pub cap_ease: f64 = 1.02,
     }
 
     /// Cut of a hood.

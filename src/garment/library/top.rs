@@ -7,8 +7,6 @@ use crate::{
     SizeRow,
 };
 
-/// Length of a sleeve cap over that of the armhole.
-const CAP_EASE: f64 = 1.02;
 /// Iterations for the height of a sleeve cap.
 const CAP_ITERATIONS: usize = 40;
 
@@ -141,7 +139,7 @@ fn sleeves(row: &SizeRow, cut: &SleeveCut, panels: &mut Vec<Panel>, seams: &mut 
     let bicep = (row.upper_arm + cut.ease) / 2.0; // half width of the sleeve at the underarm
     let length = cut.length.unwrap_or(row.arm);
     let cuff = bicep * cut.cuff;
-    let cap_length = hole * CAP_EASE;
+    let cap_length = hole * cut.cap_ease;
     let mut cap = 0.10;
     let build = |cap: f64| {
         let (l, r, top) = ([-bicep, -cap], [bicep, -cap], [0.0, 0.0]);
