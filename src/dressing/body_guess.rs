@@ -5,14 +5,8 @@ use super::file_frame::{FileFrame, bounds};
 use super::settings::GuessSettings;
 use nalgebra::{UnitQuaternion, Vector3};
 use std::sync::Arc;
-use tryon_body::{BodyShape, BoneTransforms, Pose, RestBody, SkinSearch, Template, skin};
+use tryon_body::{BodyShape, BoneTransforms, Pose, RestBody, SkinSearch, Template};
 use tryon_geometry::math::{Body, P3, Rigid, V3, World, log_so3};
-use tryon_geometry::par::Par;
-
-/// Limits of a garment's largest extent, metres; they decide the file's unit.
-const EXTENT: [f32; 2] = [0.22, 2.2];
-/// Distance within which skin is searched, metres.
-const ANYWHERE: f32 = 10.0;
 
 /// Scale, arms below the horizontal (rad), shift of the garment up and to the front (m).
 type Guess = [f64; 4];
@@ -66,7 +60,7 @@ impl<'a> GuessFit<'a> {
         settings: &'a GuessSettings,
     ) -> Self {
         let (lo, hi) = bounds(garment.iter());
-        let scale = FileFrame::unit_of((hi - lo).amax(), EXTENT).unwrap_or(1.0);
+        let scale = FileFrame::unit_of((hi - lo).amax(), settings.extent).unwrap_or(1.0);
         // The person in a file may stand anywhere in a room.
         let middle = nalgebra::center(&lo, &hi).coords * scale;
         let aside = V3::new(middle.x, 0.0, middle.z);
@@ -118,15 +112,8 @@ impl<'a> GuessFit<'a> {
             }
         }
         let mut bones = BoneTransforms::default();
-        pose.bones(sk, rest, &mut bones);
         let mut out = Vec::new();
-        skin(
-            Par::Rayon,
-            &rest.vertices,
-            self.template.weights(),
-            &bones,
-            &mut out,
-        );
+        self.template.skin_pose(rest, &pose, &mut bones, &mut out);
         out.iter_mut().for_each(|p| *p *= scale as f32);
         bones.joints.iter_mut().for_each(|p| *p *= scale);
         (out, bones)
@@ -139,7 +126,7 @@ impl<'a> GuessFit<'a> {
         let shift = V3::new(0.0, q[2] as f32, q[3] as f32);
         let distance = |p: &P3| {
             let p = p + shift;
-            let Some((near, d2)) = skin.nearest(&p, &V3::zeros(), ANYWHERE) else {
+            let Some((near, d2)) = skin.nearest(&p, &V3::zeros(), self.settings.search) else {
                 return far * inside;
             };
             if skin.height(&p, near) < 0.0 {

@@ -4,14 +4,10 @@ use super::settings::SectionSettings;
 use std::ops::Range;
 use tryon_body::measure::Measurements;
 use tryon_body::parts::vertex_masks;
-use tryon_body::{BoneTransforms, RestBody, Template, skin};
+use tryon_body::{BoneTransforms, RestBody, Template};
 use tryon_garment::Region;
 use tryon_geometry::math::{P3, P3d};
 use tryon_geometry::mesh::Face;
-use tryon_geometry::par::Par;
-
-/// Heights of hip joints and shoulders over stature, for skeletons without these joints (ANSUR II).
-const JOINT_HEIGHTS: [f32; 2] = [0.52, 0.8];
 
 /// One horizontal cross-section: its bounding box and the girth of its convex hull (as a tape measures it), metres.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -192,15 +188,8 @@ impl BodySections {
     ) -> Self {
         let pose = super::canonical::canonical_pose(template, rest, &settings.canonical);
         let mut bones = BoneTransforms::default();
-        pose.bones(template.skeleton(), rest, &mut bones);
         let mut vertices = Vec::new();
-        skin(
-            Par::Rayon,
-            &rest.vertices,
-            template.weights(),
-            &bones,
-            &mut vertices,
-        );
+        template.skin_pose(rest, &pose, &mut bones, &mut vertices);
         let parts = vertex_masks(template);
         let faces = template.mesh().faces();
         let spacing = settings.spacing;
@@ -233,8 +222,8 @@ impl BodySections {
             let found = names.iter().find_map(|n| template.skeleton().index(n));
             found.map_or(lo + share * stature, |j| self.joints[j].y as f32)
         };
-        let pelvis = joint_height(["left_hip", "pelvis"], JOINT_HEIGHTS[0]);
-        let shoulder = joint_height(["left_shoulder", "neck"], JOINT_HEIGHTS[1]);
+        let pelvis = joint_height(["left_hip", "pelvis"], settings.joint_heights[0]);
+        let shoulder = joint_height(["left_shoulder", "neck"], settings.joint_heights[1]);
         // The lowest skin on the centre line, legs apart.
         let lower = Region::TRUNK.with(Region::LEFT_LEG).with(Region::RIGHT_LEG);
         let lowest = self

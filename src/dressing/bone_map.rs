@@ -1,15 +1,11 @@
 //! Affine map of each bone from one body to another: turned, stretched to the other's length and widened to its girth.
 
 use super::body_sections::BodySections;
+use super::settings::RetargetSettings;
 use nalgebra::{Matrix3, UnitQuaternion, center};
 use tryon_body::parts::mean_radius;
 use tryon_body::{Joint, Template};
 use tryon_geometry::math::{P3, P3d, V3d};
-
-/// Lengths below this have no ratio, metres.
-const SHORTEST: f64 = 1e-3;
-/// Limits of the ratio of two bodies' lengths: grown bodies differ by less.
-const RATIO: [f64; 2] = [0.5, 2.0];
 
 /// x ↦ to + m (x − from), metres.
 #[derive(Clone, Copy, Debug)]
@@ -30,11 +26,13 @@ pub(super) fn bone_maps(
     source: &Template,
     target: &Template,
     sections: &BodySections,
+    settings: &RetargetSettings,
 ) -> Vec<BoneMap> {
     let pair = BodyPair {
         source,
         target,
         sections,
+        settings,
     };
     let trunk = pair.trunk();
     let mut out: Vec<BoneMap> = Vec::with_capacity(source.skeleton().len());
@@ -45,20 +43,22 @@ pub(super) fn bone_maps(
     out
 }
 
-fn ratio(from: Option<f64>, to: Option<f64>) -> f64 {
-    match (from, to) {
-        (Some(a), Some(b)) if a > SHORTEST => (b / a).clamp(RATIO[0], RATIO[1]),
-        _ => 1.0,
-    }
-}
-
 struct BodyPair<'a> {
     source: &'a Template,
     target: &'a Template,
     sections: &'a BodySections,
+    settings: &'a RetargetSettings,
 }
 
 impl BodyPair<'_> {
+    /// Ratio of two lengths, metres; one where either is missing or too short.
+    fn ratio(&self, from: Option<f64>, to: Option<f64>) -> f64 {
+        let [least, most] = self.settings.ratio;
+        match (from, to) {
+            (Some(a), Some(b)) if a > self.settings.shortest => (b / a).clamp(least, most),
+            _ => 1.0,
+        }
+    }
     /// A joint on the source and on the target.
     fn joint(&self, name: &str) -> [Option<P3d>; 2] {
         let source = self.source.skeleton();
@@ -84,9 +84,9 @@ impl BodyPair<'_> {
         let shoulders = self.sides("shoulder");
         let hips = self.sides("hip").map(middle);
         let [from, to] = shoulders.map(|pair| pair.map(|[l, r]| (l - r).norm()));
-        let wide = ratio(from, to);
+        let wide = self.ratio(from, to);
         let height = |k: usize| Some((middle(shoulders[k])? - hips[k]?).y);
-        let high = ratio(height(0), height(1));
+        let high = self.ratio(height(0), height(1));
         BoneMap {
             m: Matrix3::from_diagonal(&V3d::new(wide, high, wide)),
             from: hips[0].unwrap_or_else(P3d::origin),
@@ -121,11 +121,11 @@ impl BodyPair<'_> {
     fn limb(&self, joint: &str, end: &str) -> Option<BoneMap> {
         let ([a, c], [b, d]) = (self.both(joint)?, self.both(end)?);
         let (u, v) = ((b - a).try_normalize(0.0)?, (d - c).try_normalize(0.0)?);
-        let along = ratio(Some((b - a).norm()), Some((d - c).norm()));
+        let along = self.ratio(Some((b - a).norm()), Some((d - c).norm()));
         let radius = |body: &Template, vertices: &[P3], bone| {
             mean_radius(body, vertices, body.skeleton().index(joint)?, bone)
         };
-        let around = ratio(
+        let around = self.ratio(
             radius(self.source, self.source.mesh().vertices(), [a, b]),
             radius(self.target, &self.sections.vertices, [c, d]),
         );
@@ -151,7 +151,7 @@ impl BodyPair<'_> {
     fn scaled(&self, joint: &str, end: &str) -> Option<BoneMap> {
         let [from, to] = self.both(joint)?;
         let [a, b] = self.joint(end);
-        let s = ratio(a.map(|p| (p - from).norm()), b.map(|p| (p - to).norm()));
+        let s = self.ratio(a.map(|p| (p - from).norm()), b.map(|p| (p - to).norm()));
         Some(BoneMap {
             m: Matrix3::identity() * s,
             from,

@@ -30,7 +30,7 @@ impl Retargeting {
     ) -> Self {
         let n = source.mesh().vertices().len();
         let mut out = Self {
-            bones: bone_maps(source, target, sections),
+            bones: bone_maps(source, target, sections, settings),
             residual: vec![V3d::zeros(); n],
         };
         let parts = vertex_masks(source);

@@ -10,11 +10,6 @@ use tryon_geometry::math::P3;
 use tryon_geometry::mesh::Topology;
 use tryon_geometry::spatial::PointTree;
 
-/// Height of the shoulders of a skeleton without joints there, metres.
-const DEFAULT_SHOULDER: f32 = 1.4;
-/// Distance within which skin is searched, metres.
-const ANYWHERE: f32 = 10.0;
-
 /// Both legs.
 pub(super) const LEGS: Region = Region::LEFT_LEG.with(Region::RIGHT_LEG);
 
@@ -64,7 +59,7 @@ impl<'a> PieceClassifier<'a> {
             is_end: (0..body.len()).map(|i| segment(i).is_extremity()).collect(),
             shoulder: height("left_shoulder")
                 .or_else(|| height("neck"))
-                .unwrap_or(DEFAULT_SHOULDER),
+                .unwrap_or(settings.default_shoulder),
             knee: height("left_knee").unwrap_or(f32::MIN),
             template,
             settings,
@@ -76,7 +71,7 @@ impl<'a> PieceClassifier<'a> {
             return false;
         };
         let v = piece.obj.mesh.vertices();
-        let nearest = |p| self.tree.nearest(p, ANYWHERE);
+        let nearest = |p| self.tree.nearest(p, self.settings.search);
         let over_ends = v
             .iter()
             .filter(|p| nearest(p).is_some_and(|(i, _)| self.is_end[i]))

@@ -20,9 +20,6 @@ use tryon_garment::{
 use tryon_geometry::math::P3;
 use tryon_geometry::mesh::{Face, Topology, TriMesh, face_normal, remesh};
 
-/// Smallest triangle of an accessory, m².
-const LEAST_AREA: f64 = 2e-8;
-
 /// A piece on the body that it was made on.
 #[derive(Clone, Debug)]
 pub(super) struct GarmentPiece {
@@ -112,7 +109,7 @@ impl PieceBuilder<'_> {
     /// The accessories as one rigid piece; `None` where no triangle of them has an area.
     pub(super) fn rigid(&self, pieces: &[SewnObj]) -> Result<Option<GarmentPiece>, GarmentError> {
         let has_area = |m: &TriMesh, f: &Face| {
-            0.5 * f64::from(face_normal(m.vertices(), f).norm()) > LEAST_AREA
+            0.5 * f64::from(face_normal(m.vertices(), f).norm()) > self.settings.piece.least_area
         };
         let kept = merge(pieces).and_then(|merged| {
             let mesh = &merged.obj.mesh;

@@ -6,9 +6,6 @@ use tryon_garment::GarmentMesh;
 use tryon_geometry::math::{P3, V3};
 use tryon_geometry::mesh::face_normal;
 
-/// Least half distance of the hip joints, metres.
-const LEAST_HIP: f32 = 0.05;
-
 /// Turns the faces so that they look away from the skin.
 pub(super) fn orient_outwards(g: &mut GarmentMesh, x: &[P3], binding: &SkinBinding) {
     let out: f32 = g
@@ -75,7 +72,7 @@ pub(super) fn follow_both_legs(
         for (w, _) in row.iter_mut().zip(&is_arm).filter(|(_, a)| !**a) {
             *w *= (1.0 - arm - legs) / (1.0 - arm);
         }
-        let share = smooth(0.5 + 0.5 * p.x / left[0].1.x.abs().max(LEAST_HIP));
+        let share = smooth(0.5 + 0.5 * p.x / left[0].1.x.abs().max(settings.least_hip));
         for ([hip, knee], w) in [(left, legs * share), (right, legs * (1.0 - share))] {
             let below = smooth(0.5 + (knee.1.y - p.y) / settings.knee);
             row[hip.0] += w * (1.0 - below);

@@ -10,8 +10,6 @@ use std::f32::consts::{FRAC_PI_2, PI};
 use tryon_garment::{Panel, Side};
 use tryon_geometry::math::P3;
 
-/// Height of the crotch line of a panel without one, panel coordinates, metres.
-const DEFAULT_HIP_LINE: f64 = -0.2;
 /// Least width of a row, metres.
 const LEAST_WIDTH: f32 = 1e-4;
 
@@ -46,7 +44,7 @@ impl<'a> LegChart<'a> {
             front,
             waist: (heights.fork - CROTCH_CLEARANCE as f32 - rise).min(heights.waist),
             rise,
-            hip_line: higher("crotch", DEFAULT_HIP_LINE),
+            hip_line: higher("crotch", body.settings.leg.default_hip_line),
             half: outline.half_width(),
             outline,
         }

@@ -10,8 +10,6 @@ use tryon_garment::{Panel, Pattern, Placement, Side};
 const DEFAULT_SEAM: [[f64; 2]; 2] = [[0.08, 0.0], [0.2, -0.04]];
 /// Stations along the seam at which the shoulder's height is taken.
 const STATIONS: usize = 12;
-/// Height of a shoulder seam over bodies without shoulders, metres.
-const DEFAULT_HEIGHT: f32 = 1.4;
 
 /// The body in the canonical pose and the pattern that is placed around it.
 #[derive(Clone, Copy)]
@@ -77,7 +75,7 @@ impl PlacedBody<'_> {
         if z.1 > 0.0 {
             (top, z.0 / z.1)
         } else {
-            (DEFAULT_HEIGHT, 0.0)
+            (self.settings.default_seam_height, 0.0)
         }
     }
     fn is_head(&self, vertex: usize) -> bool {

@@ -11,14 +11,6 @@ use tryon_geometry::math::P3;
 
 /// Chords of one waist edge.
 const CHORDS: usize = 8;
-/// Right end of a waist without edges, panel coordinates, metres.
-const DEFAULT_END: [f64; 2] = [0.0, 0.02];
-/// Least sag of the waist line, metres: a straight one would have its apex at infinity.
-const LEAST_SAG: f64 = 1e-4;
-/// Step and tolerance in which the height of a waistband is searched, metres of height and of girth.
-const WAIST_STEP: f32 = 0.01;
-/// Least half width of a row, metres.
-const LEAST_HALF: f32 = 0.02;
 
 /// Chart of a front or back panel.
 pub(super) struct SkirtChart<'a> {
@@ -42,16 +34,18 @@ enum SkirtRows {
 
 impl<'a> SkirtChart<'a> {
     pub(super) fn new(body: &PlacedBody<'a>, panel: &Panel, front: bool) -> Self {
+        let settings = &body.settings.skirt;
         let points = sample_edges(panel, "waist", CHORDS);
-        let end = points
-            .iter()
-            .fold(DEFAULT_END, |e, p| if p[0] > e[0] { *p } else { e });
+        let end = points.iter().fold(
+            settings.default_end,
+            |e, p| if p[0] > e[0] { *p } else { e },
+        );
         let curved = panel
             .edge("hem")
             .is_some_and(|i| panel.edges[i].curve != Curve::Line);
         let rows = if curved {
             let middle = points.iter().map(|p| p[1]).fold(end[1], f64::min);
-            let sag = (end[1] - middle).max(LEAST_SAG);
+            let sag = (end[1] - middle).max(settings.least_sag);
             let apex = ((end[0] * end[0] + sag * sag) / (2.0 * sag)) as f32;
             let half_angle = (end[0] as f32).atan2(apex - sag as f32);
             SkirtRows::Arcs { apex, half_angle }
@@ -85,7 +79,9 @@ impl<'a> SkirtChart<'a> {
                 )
             }
             SkirtRows::Level => {
-                let half = self.outline.half_width_at(p[1], LEAST_HALF);
+                let half = self
+                    .outline
+                    .half_width_at(p[1], self.settings.skirt.least_half);
                 (
                     self.waist + p[1],
                     (p[0] / half).clamp(-1.0, 1.0) * FRAC_PI_2,
@@ -100,12 +96,13 @@ impl<'a> SkirtChart<'a> {
 
 /// Height of a waistband of this girth: the waist, or lower where the hip becomes as wide as the band, metres.
 fn waist_height(body: &PlacedBody<'_>, girth: f32) -> f32 {
-    let (sections, above_hip) = (body.sections, body.settings.skirt.above_hip);
+    let sections = body.sections;
+    let settings = &body.settings.skirt;
     let mut waist = sections.heights.waist;
-    while waist > sections.heights.hip + above_hip
-        && sections.lower.at(waist).girth < girth - WAIST_STEP
+    while waist > sections.heights.hip + settings.above_hip
+        && sections.lower.at(waist).girth < girth - settings.waist_step
     {
-        waist -= WAIST_STEP;
+        waist -= settings.waist_step;
     }
     waist
 }

@@ -2,23 +2,13 @@
 
 use super::outline::PanelOutline;
 use super::placed_body::{PlacedBody, sign};
+use crate::settings::SleevePlaceSettings;
 use std::f32::consts::PI;
 use tryon_garment::{Panel, Region, Side};
 use tryon_geometry::math::{P3, V3};
 
-/// Distance between the stations at which an arm is measured, metres.
-const STATION: f32 = 0.01;
 /// Stations on either side over which the largest arm radius counts.
 const NEIGHBOURS: usize = 2;
-/// ArmShape radius beyond the measured stations, metres.
-const DEFAULT_RADIUS: f32 = 0.05;
-/// Share of the half width from which a corner of the outline belongs to the bicep line.
-const BICEP: f32 = 0.97;
-/// Least half width of a row, metres.
-const LEAST_HALF: f32 = 0.02;
-/// Left shoulder joint of a skeleton without one, and from there to the elbow, metres.
-const DEFAULT_SHOULDER: [f32; 3] = [0.17, 1.35, 0.0];
-const DEFAULT_UPPER_ARM: [f32; 3] = [0.25, -0.1, 0.0];
 
 /// Chart of one sleeve.
 pub(super) struct SleeveChart {
@@ -36,12 +26,13 @@ pub(super) struct SleeveChart {
 
 impl SleeveChart {
     pub(super) fn new(body: &PlacedBody<'_>, panel: &Panel, side: Side) -> Self {
+        let settings = &body.settings.sleeve;
         let outline = PanelOutline::of(panel);
         let bicep = outline.half_width();
         let cap = outline
             .points()
             .iter()
-            .filter(|p| p[0].abs() > BICEP * bicep)
+            .filter(|p| p[0].abs() > settings.bicep * bicep)
             .map(|p| p[1])
             .fold(f32::MIN, f32::max);
         let arm = ArmShape::measure(body, side);
@@ -62,7 +53,8 @@ impl SleeveChart {
         let half = if p[1] > self.cap {
             self.bicep
         } else {
-            self.outline.half_width_at(p[1], LEAST_HALF)
+            self.outline
+                .half_width_at(p[1], self.arm.settings.least_half)
         };
         let s = self.start - p[1];
         let upper = self.arm.upper_length();
@@ -88,6 +80,7 @@ impl SleeveChart {
 
 /// An arm of the canonical body and its thickness.
 struct ArmShape {
+    settings: SleevePlaceSettings,
     /// Shoulder, elbow, wrist.
     joints: [P3; 3],
     /// Half sizes upwards and to the front at stations along the arm, metres.
@@ -104,11 +97,13 @@ impl ArmShape {
             let index = body.template.skeleton().index(&format!("{name}_{n}"));
             index.map(|j| body.sections.joints[j].cast::<f32>())
         };
+        let settings = body.settings.sleeve;
         let mirrored = |v: [f32; 3]| V3::new(sign * v[0], v[1], v[2]);
-        let shoulder = joint("shoulder").unwrap_or(P3::from(mirrored(DEFAULT_SHOULDER)));
-        let elbow = joint("elbow").unwrap_or(shoulder + mirrored(DEFAULT_UPPER_ARM));
+        let shoulder = joint("shoulder").unwrap_or(P3::from(mirrored(settings.default_shoulder)));
+        let elbow = joint("elbow").unwrap_or(shoulder + mirrored(settings.default_upper_arm));
         let wrist = joint("wrist").unwrap_or(elbow + (elbow - shoulder));
         let mut out = Self {
+            settings,
             joints: [shoulder, elbow, wrist],
             radius: Vec::new(),
         };
@@ -123,8 +118,12 @@ impl ArmShape {
         (self.joints[bone + 1] - self.joints[bone]).normalize()
     }
     fn radius_at(&self, s: f32) -> [f32; 2] {
-        let i = ((s / STATION).max(0.0) as usize).min(self.radius.len().saturating_sub(1));
-        self.radius.get(i).copied().unwrap_or([DEFAULT_RADIUS; 2])
+        let i = ((s / self.settings.station).max(0.0) as usize)
+            .min(self.radius.len().saturating_sub(1));
+        self.radius
+            .get(i)
+            .copied()
+            .unwrap_or([self.settings.default_radius; 2])
     }
     fn measure_radius(&self, body: &PlacedBody<'_>, side: Side) -> Vec<[f32; 2]> {
         let mask = if side == Side::Left {
@@ -134,7 +133,7 @@ impl ArmShape {
         };
         let (upper, [_, elbow, wrist]) = (self.upper_length(), self.joints);
         let directions = [self.direction(0), self.direction(1)];
-        let n = ((upper + (wrist - elbow).norm()) / STATION) as usize + 1;
+        let n = ((upper + (wrist - elbow).norm()) / self.settings.station) as usize + 1;
         let mut radius = vec![[0.0f32; 2]; n];
         let own = body.sections.vertices.iter().zip(&body.sections.parts);
         for (p, _) in own.filter(|(_, part)| **part & mask.0 != 0) {
@@ -144,7 +143,7 @@ impl ArmShape {
             } else {
                 (upper + (p - elbow).dot(&directions[1]), 1)
             };
-            let i = (s / STATION).floor();
+            let i = (s / self.settings.station).floor();
             if i < 0.0 || i as usize >= n {
                 continue;
             }
@@ -154,15 +153,18 @@ impl ArmShape {
             let r = &mut radius[i as usize];
             *r = [r[0].max(up), r[1].max(d.z.abs())];
         }
-        widen(&radius, body.settings.armhole)
+        widen(
+            &radius,
+            (body.settings.armhole / self.settings.station) as usize,
+        )
     }
 }
 
-/// Largest radius around each station; stations within `armhole` metres take those farther out.
-fn widen(radius: &[[f32; 2]], armhole: f32) -> Vec<[f32; 2]> {
-    let (n, inner) = (radius.len(), (armhole / STATION) as usize);
+/// Largest radius around each station; the first `armhole` stations take those farther out.
+fn widen(radius: &[[f32; 2]], armhole: usize) -> Vec<[f32; 2]> {
+    let n = radius.len();
     let around = |i: usize, k: usize| {
-        let i = i.max(inner);
+        let i = i.max(armhole);
         (i.saturating_sub(NEIGHBOURS)..(i + NEIGHBOURS + 1).min(n))
             .map(|j| radius[j][k])
             .fold(0.0, f32::max)

@@ -9,11 +9,6 @@ use std::f32::consts::FRAC_PI_2;
 use tryon_garment::Panel;
 use tryon_geometry::math::P3;
 
-/// Least half width of a row, metres.
-const LEAST_HALF: f32 = 0.05;
-/// Underarm point of a panel that has none, panel coordinates, metres (library T-shirt, M).
-const DEFAULT_UNDERARM: [f64; 2] = [0.26, -0.22];
-
 /// Chart of a front or back panel.
 pub(super) struct TrunkChart<'a> {
     sections: &'a BodySections,
@@ -43,7 +38,7 @@ impl<'a> TrunkChart<'a> {
                 corners
                     .filter(|p| p[0] > tip[0] + outside && p[1] < tip[1] - below)
                     .max_by(|a, b| a[1].total_cmp(&b[1]))
-                    .unwrap_or(DEFAULT_UNDERARM)
+                    .unwrap_or(body.settings.trunk.default_underarm)
             },
             |[from, _]| from,
         );
@@ -73,7 +68,7 @@ impl<'a> TrunkChart<'a> {
         let x = if self.front { p[0] } else { -p[0] };
         let y = self.top + p[1];
         let width = if p[1] < armpit {
-            self.outline.half_width_at(p[1], LEAST_HALF)
+            self.outline.half_width_at(p[1], settings.trunk.least_half)
         } else {
             self.half
         };

@@ -48,6 +48,10 @@ settings! {
         pub near_shoulder: f32 = 0.02,
         /// Share of vertices over legs from which a garment is a dress (from the shoulders) or a skirt (from an opening).
         pub over_legs: [f64; 2] = [0.25, 0.15],
+        /// Height of the shoulders of a skeleton without joints there, metres.
+        pub default_shoulder: f32 = 1.4,
+        /// Distance within which skin is searched, metres.
+        pub search: f32 = 10.0,
     }
 
     /// Settings of the anchors.
@@ -72,6 +76,8 @@ settings! {
         pub middle: f32 = 0.02,
         /// Share of its area below which a retargeted triangle has collapsed and keeps its rest shape.
         pub collapsed: f64 = 0.2,
+        /// Smallest triangle of an accessory, m².
+        pub least_area: f64 = 2e-8,
     }
 
     /// Settings of the clearance over the skin: a rest shape taken below it would be too tight for good.
@@ -90,6 +96,8 @@ settings! {
         pub leg_fade: f32 = 0.12,
         /// Height over which a knee bends a skirt, metres.
         pub knee: f32 = 0.10,
+        /// Least half distance of the hip joints, metres.
+        pub least_hip: f32 = 0.05,
     }
 
     /// Settings of retargeting.
@@ -102,6 +110,10 @@ settings! {
         pub offset: f32 = 0.04,
         /// Smoothing iterations of the skin residual in the first and the second pass, one edge (1 cm) each.
         pub smoothing: [usize; 2] = [30, 8],
+        /// Lengths below this have no ratio, metres.
+        pub shortest: f64 = 1e-3,
+        /// Limits of the ratio of two bodies' lengths: grown bodies differ by less.
+        pub ratio: [f64; 2] = [0.5, 2.0],
     }
 
     /// Settings of the guessed body.
@@ -136,6 +148,10 @@ settings! {
         pub steps: [f64; 4] = [0.04, 0.2, 0.04, 0.02],
         /// Halvings of the steps.
         pub halvings: usize = 5,
+        /// Limits of a garment's largest extent, metres; they decide the file's unit.
+        pub extent: [f32; 2] = [0.22, 2.2],
+        /// Distance within which skin is searched, metres.
+        pub search: f32 = 10.0,
     }
 }
 

@@ -17,7 +17,7 @@ pub use mesh_garment::{
 };
 pub use place::{
     HoodPlaceSettings, LegPlaceSettings, PlaceSettings, SewSettings, SkirtPlaceSettings,
-    TrunkPlaceSettings, TubeSettings,
+    SleevePlaceSettings, TrunkPlaceSettings, TubeSettings,
 };
 pub use sections::{CanonicalSettings, SectionSettings};
 

@@ -19,8 +19,12 @@ settings! {
         pub tube: TubeSettings = TubeSettings::default(),
         /// Clearance of the shoulder seam over the skin, metres: less sinks in where the shoulder is hollow.
         pub seam_clearance: f32 = 0.008,
+        /// Height of a shoulder seam over bodies without shoulders, metres.
+        pub default_seam_height: f32 = 1.4,
         /// Length of arm at the armhole that is measured farther out, metres: the skin is open there.
         pub armhole: f32 = 0.07,
+        /// Sleeves.
+        pub sleeve: SleevePlaceSettings = SleevePlaceSettings::default(),
         /// Trunk.
         pub trunk: TrunkPlaceSettings = TrunkPlaceSettings::default(),
         /// Legs.
@@ -47,6 +51,26 @@ settings! {
         pub lower_body: f32 = 0.05,
         /// Least distance of an underarm point outside and below the shoulder tip, metres.
         pub underarm: [f64; 2] = [0.01, 0.05],
+        /// Least half width of a row, metres.
+        pub least_half: f32 = 0.05,
+        /// Underarm point of a panel that has none, panel coordinates, metres (library T-shirt, M).
+        pub default_underarm: [f64; 2] = [0.26, -0.22],
+    }
+
+    /// Settings of sleeves.
+    pub struct SleevePlaceSettings {
+        /// Distance between the stations at which an arm is measured, metres.
+        pub station: f32 = 0.01,
+        /// Radius of an arm beyond the measured stations, metres.
+        pub default_radius: f32 = 0.05,
+        /// Share of the half width from which a corner of the outline belongs to the bicep line.
+        pub bicep: f32 = 0.97,
+        /// Least half width of a row, metres.
+        pub least_half: f32 = 0.02,
+        /// Left shoulder joint of a skeleton without one, metres.
+        pub default_shoulder: [f32; 3] = [0.17, 1.35, 0.0],
+        /// Way from there to the elbow of a skeleton without one, metres.
+        pub default_upper_arm: [f32; 3] = [0.25, -0.1, 0.0],
     }
 
     /// Settings of trouser panels.
@@ -55,6 +79,8 @@ settings! {
         pub inseam_gap: f32 = 0.001,
         /// Highest section of one leg alone, metres below the crotch. Less cuts the other thigh too.
         pub top: f32 = 0.04,
+        /// Height of the crotch line of a panel without one, panel coordinates, metres.
+        pub default_hip_line: f64 = -0.2,
     }
 
     /// Settings of skirts and waistbands.
@@ -63,6 +89,14 @@ settings! {
         pub shortened: f32 = 0.97,
         /// Least height of a waistband above the hip, metres: lower it slides off.
         pub above_hip: f32 = 0.05,
+        /// Right end of a waist without edges, panel coordinates, metres.
+        pub default_end: [f64; 2] = [0.0, 0.02],
+        /// Least sag of the waist line, metres: a straight one would have its apex at infinity.
+        pub least_sag: f64 = 1e-4,
+        /// Step and tolerance in which the height of a waistband is searched, metres of height and of girth.
+        pub waist_step: f32 = 0.01,
+        /// Least half width of a row, metres.
+        pub least_half: f32 = 0.02,
     }
 
     /// Settings of hoods, laid back.

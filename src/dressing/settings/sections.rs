@@ -21,6 +21,8 @@ settings! {
         pub hip_range: [f32; 2] = [0.02, 0.32],
         /// Heights above the crotch between which the waist is narrowest, shares of the trunk.
         pub waist_range: [f32; 2] = [0.30, 0.62],
+        /// Heights of hip joints and shoulders over stature, for skeletons without these joints (ANSUR II).
+        pub joint_heights: [f32; 2] = [0.52, 0.8],
     }
 
     /// Settings of the canonical pose.
