@@ -1,5 +1,6 @@
 //! The person in a still: depth frames from virtual cameras around a shape, and the steps of the tracker on one of them.
 
+use crate::settings::StillCameraSettings;
 use crate::{StepError, StepReport, TrackerConfig, TrackerModel, TrackerState, Workspace, step};
 use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
 use std::sync::Arc;
@@ -10,13 +11,8 @@ use tryon_geometry::mesh::Face;
 use tryon_geometry::par::Par;
 use tryon_geometry::raster::{Options, View, VisibilityBuffer, rasterise_with};
 
-/// Columns, rows and focal length, pixels: those of the sensors that the tracker is made for.
+/// Columns and rows, pixels: those of the sensors that the tracker is made for.
 const SIZE: [u32; 2] = [480, 640];
-const FOCAL: f32 = 525.0;
-/// Share of the rows that the person fills.
-const FILL: f32 = 0.72;
-/// Nearest surface drawn, metres.
-const NEAR: f32 = 0.1;
 
 /// A camera at a shape.
 #[derive(Clone, Debug)]
@@ -31,18 +27,19 @@ impl VirtualCamera {
     /// Camera that sees the whole of `bounds` from the direction `yaw` about the vertical, radians; 0 looks along −z.
     pub fn around([low, high]: [P3; 2], yaw: f64) -> Self {
         let [width, height] = SIZE;
+        let StillCameraSettings { focal, fill, .. } = StillCameraSettings::default();
         let depth = Intrinsics {
             width,
             height,
-            fx: f64::from(FOCAL),
-            fy: f64::from(FOCAL),
+            fx: f64::from(focal),
+            fy: f64::from(focal),
             cx: f64::from(width - 1) / 2.0,
             cy: f64::from(height - 1) / 2.0,
         };
         let extent = high - low;
         let across = extent.x.max(extent.z);
         let share = (extent.y / height as f32).max(across / width as f32);
-        let distance = f64::from((share * FOCAL / FILL + 0.5 * across).max(1.0));
+        let distance = f64::from((share * focal / fill + 0.5 * across).max(1.0));
         let middle = nalgebra::center(&low, &high).cast::<f64>();
         let around = Rotation3::from_axis_angle(&Vector3::y_axis(), yaw);
         // Camera axes in the world: x to the right of the picture, y down, z towards the person.
@@ -70,7 +67,7 @@ impl VirtualCamera {
     pub fn depth(&self, points: &[P3], faces: &[Face]) -> Vec<f32> {
         let view = View::Perspective {
             camera: self.calibration.depth,
-            near: NEAR,
+            near: StillCameraSettings::default().near,
         };
         let mut buffer = VisibilityBuffer::default();
         let options = Options {

@@ -8,7 +8,7 @@ use tryon_tracking::part_classes::PART_CLASSES;
 use tryon_tracking::segment::part_forest::{CellLabel, ForestSpec, PartForest, TrainingSet, train};
 
 /// Sizes of a training.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TrainingPlan {
     /// Frames to render, about 4 ms each; rounded up to whole people.
     pub images: usize,

@@ -33,9 +33,6 @@ pub struct JointConfidence {
     pub reason: ConfidenceReason,
 }
 
-/// Distance from a limit that counts as at the limit, radians.
-const LIMIT: f64 = 1e-3;
-
 /// Confidence of every joint of the skeleton, in a pose that agrees with its frame so far.
 pub(crate) fn confidence(
     context: &FitContext<'_>,
@@ -65,7 +62,8 @@ pub(crate) fn confidence(
             .map(|k| scratch.information(k))
             .fold(f64::INFINITY, f64::min);
         let at_limit = angles.clone().any(|k| {
-            pose.angles[k] - limits[k][0] < LIMIT || limits[k][1] - pose.angles[k] < LIMIT
+            pose.angles[k] - limits[k][0] < settings.at_limit
+                || limits[k][1] - pose.angles[k] < settings.at_limit
         });
         let share = readings[bone] as f32 / (readings[bone] as f32 + settings.half_sure);
         let free = agreement.parts[model.parts[j]];

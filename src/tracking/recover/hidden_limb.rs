@@ -10,8 +10,6 @@ use tryon_body::{BoneTransforms, Pose};
 use tryon_geometry::math::P3;
 use tryon_geometry::spatial::Label;
 
-/// Step of the finite differences, radians: larger is off by the limb's curvature, smaller by rounding.
-const STEP: f64 = 1e-4;
 /// Points of a limb: middle of the upper bone, hinge, middle of the lower bone, end, hand or foot.
 const POINTS: usize = 5;
 /// Angles of a limb: a ball and a hinge.
@@ -59,12 +57,12 @@ impl HiddenLimb<'_> {
         }
         let mut jacobian = SMatrix::<f64, { 3 * POINTS }, ANGLES>::zeros();
         for (column, &angle) in self.limb.angles.iter().enumerate().take(ANGLES) {
-            pose.angles[angle] += STEP;
+            pose.angles[angle] += settings.difference;
             let moved = self.points(pose, bones);
-            pose.angles[angle] -= STEP;
+            pose.angles[angle] -= settings.difference;
             for (k, target) in targets.iter().enumerate() {
                 if target.is_some() {
-                    let d = (moved[k] - points[k]) / STEP;
+                    let d = (moved[k] - points[k]) / settings.difference;
                     jacobian.fixed_view_mut::<3, 1>(3 * k, column).copy_from(&d);
                 }
             }

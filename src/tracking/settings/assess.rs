@@ -39,6 +39,8 @@ settings! {
         /// Depth behind the drawn model from which a model point is occluded by it, metres. Larger takes occluded bones for
         /// ones without return.
         pub hidden: f32 = 0.05,
+        /// Distance from a limit that counts as at the limit, radians.
+        pub at_limit: f64 = 1e-3,
     }
 
     /// Settings of the sequential test for a person.

@@ -3,6 +3,7 @@
 mod assess;
 mod fit;
 mod model;
+mod part_forest;
 mod recover;
 mod registration;
 mod segment;
@@ -15,7 +16,8 @@ pub use assess::{AssessSettings, BeliefSettings, ConfidenceSettings, SeatSetting
 pub use fit::{
     FitSettings, HandAssignmentSettings, PredictionSettings, Schedule, StandingSettings,
 };
-pub use model::ModelSettings;
+pub use model::{ModelSettings, StillCameraSettings};
+pub use part_forest::{ForestSpec, PartVoteSettings};
 pub use recover::{HiddenLimbSettings, RecoverSettings, RepairSettings};
 pub use registration::{Association, FloorSettings, RegistrationSettings};
 pub use segment::{

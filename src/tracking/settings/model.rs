@@ -17,4 +17,14 @@ settings! {
         /// Weight of eq. 23 between left and right bones, and between successive bones of a limb.
         pub tie_weights: [f64; 2] = [1.0, 0.5],
     }
+
+    /// Settings of the camera before a still person.
+    pub struct StillCameraSettings {
+        /// Focal length, pixels.
+        pub focal: f32 = 525.0,
+        /// Share of the rows that the person fills.
+        pub fill: f32 = 0.72,
+        /// Nearest surface drawn, metres.
+        pub near: f32 = 0.1,
+    }
 }

@@ -32,6 +32,8 @@ settings! {
         pub most_unknown: f32 = 0.13,
         /// Share of the area that may be uncovered meanwhile: an arm that is lost leaves readings uncovered where it is.
         pub most_uncovered: f32 = 0.02,
+        /// Step of the finite differences, radians: larger is off by the limb's curvature, smaller by rounding.
+        pub difference: f64 = 1e-4,
     }
 
     /// Settings of the repairs.

@@ -71,6 +71,9 @@ settings! {
         pub adults: [f64; 2] = [1.3, 2.2],
         /// Least stature of a child, metres; it is also a height of adults who crouch or sit.
         pub least_child: f64 = 0.9,
+        /// Regularisation of the eliminated pose, per point: far below any observed angle, keeps unobserved ones from absorbing
+        /// all information.
+        pub pose_ridge: f64 = 1e-7,
     }
 
     /// Settings of the surface displacements.

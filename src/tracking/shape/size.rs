@@ -34,9 +34,6 @@ pub struct SizeEstimate {
 pub(crate) const MOST_DEVIATIONS: f64 = 8.0;
 /// Bounds of a bone's scale.
 pub(crate) const SCALES: [f64; 2] = [0.5, 1.4];
-/// Regularisation of the eliminated pose, per point: far below any observed angle, keeps unobserved ones from absorbing
-/// all information.
-const POSE_RIDGE: f64 = 1e-7;
 
 impl SizeEstimate {
     /// Estimate of a size that was measured before, over `frames` frames: it does not change.
@@ -315,7 +312,7 @@ fn frame_information(
     });
     let mut pose_hessian = scratch.equations.hessian.clone();
     for k in 0..pose_hessian.nrows() {
-        pose_hessian[(k, k)] += POSE_RIDGE;
+        pose_hessian[(k, k)] += settings.pose_ridge;
     }
     let factor = pose_hessian.cholesky()?;
     let pose_gradient = &scratch.equations.gradient;

@@ -23,9 +23,6 @@ pub(crate) struct Outline {
     pub stature: Option<f64>,
 }
 
-/// Turns of bodies that face the camera and that face away.
-const FACINGS: [f64; 2] = [0.0, PI];
-
 /// Points of the subject's cells that have a reading.
 fn points<'a>(observation: &'a Observation<'_>) -> impl Iterator<Item = (usize, P3)> + 'a {
     let grid = observation.grid;
@@ -179,7 +176,8 @@ fn searched(
 ) -> Vec<Pose> {
     let settings = &context.model.config.start;
     let mut best: Vec<(f64, Pose)> = proposed.map(|p| (0.0, p)).into_iter().collect();
-    for (facing, finalists) in FACINGS.into_iter().zip(settings.finalists) {
+    // Bodies that face the camera, and that face away.
+    for (facing, finalists) in [0.0, PI].into_iter().zip(settings.finalists) {
         let mut trunks = trunks(context, outline, up, facing, scratch);
         trunks.sort_by(|a, b| a.0.total_cmp(&b.0));
         best.extend(trunks.into_iter().take(finalists));

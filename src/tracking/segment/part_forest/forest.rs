@@ -6,18 +6,18 @@ use super::feature::{DepthWindow, PersonCells, WindowBox};
 use super::modes::{JointProposal, ModeScratch, find_modes};
 use super::tree::{DecisionTree, LEAF, LeafShares};
 use super::yaw::{YAW_BINS, YawBelief};
+use crate::settings::PartVoteSettings;
 use std::sync::{Arc, OnceLock};
 
 /// Bytes of the embedded forest, from `tryon-bench train-parts`.
 static EMBEDDED: &[u8] = include_bytes!("parts.bin");
-/// Least belief in front and in back: where the yaw is wrong, the classes of the other side remain.
-const LEAST_PRIOR: f32 = 0.02;
 
 /// Classifier of the cells of a person into body parts.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PartForest {
     pub(super) classes: usize,
     pub(super) trees: Vec<DecisionTree>,
+    pub(super) settings: PartVoteSettings,
 }
 
 /// Scratch of the classification; dropping it changes no result.
@@ -54,7 +54,11 @@ impl PartForest {
     /// Names the fault in the bytes.
     pub fn from_bytes(bytes: &[u8]) -> Result<Self, PartForestError> {
         let (classes, trees) = bytes::decode(bytes)?;
-        Ok(Self { classes, trees })
+        Ok(Self {
+            classes,
+            trees,
+            settings: PartVoteSettings::default(),
+        })
     }
     /// Bytes of the forest, little-endian, with a version and a checksum.
     pub fn to_bytes(&self) -> Vec<u8> {
@@ -154,12 +158,13 @@ impl PartForest {
                 }
             }
         }
-        scratch.yaw = YawBelief::of_votes(&logs, cells);
+        scratch.yaw = YawBelief::of_votes(&logs, cells, self.settings.independent_votes);
     }
 
     /// Class distributions for probabilities of front and back.
     fn weigh(&self, [front, back]: [f32; 2], scratch: &mut PartScratch) {
-        let (front, back) = (front.max(LEAST_PRIOR), back.max(LEAST_PRIOR));
+        let least = self.settings.least_prior;
+        let (front, back) = (front.max(least), back.max(least));
         let weight: [f32; 256] = std::array::from_fn(|f| {
             let f = f as f32 / 255.0;
             front * f + back * (1.0 - f)
@@ -197,8 +202,8 @@ impl PartForest {
 
     fn modes(&self, person: &PersonCells<'_>, scratch: &mut PartScratch) -> Vec<JointProposal> {
         let (map, modes) = (&scratch.map, &mut scratch.modes);
-        modes.gather(person, map);
-        find_modes(modes)
+        modes.gather(person, map, self.settings.least_share);
+        find_modes(modes, &self.settings)
     }
 }
 

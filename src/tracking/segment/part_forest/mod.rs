@@ -15,11 +15,12 @@ mod training_set;
 mod tree;
 mod yaw;
 
+pub use crate::settings::ForestSpec;
 pub use bytes::PartForestError;
 pub use class_map::ClassMap;
 pub use feature::PersonCells;
 pub use forest::{PartForest, PartScratch};
 pub use modes::JointProposal;
-pub use train::{ForestSpec, train};
+pub use train::train;
 pub use training_set::{CellLabel, TrainingSet};
 pub use yaw::{YAW_BINS, YawBelief};

@@ -3,26 +3,17 @@
 use super::class_map::ClassMap;
 use super::feature::{PersonCells, ray_axes};
 use super::tree::OFFSET_UNIT;
+use crate::settings::PartVoteSettings;
 use tryon_geometry::math::P3;
 
-/// Least share of a class at a cell that votes; Shotton et al. chose 0.14.
-const LEAST_SHARE: f32 = 0.14;
-/// Radius of the kernel, metres. The biweight kernel of this radius has the width of a Gaussian of 6.5 cm.
-const RADIUS: f32 = 0.17;
-/// Distance under which two modes are one, metres.
-const SAME_MODE: f32 = 0.10;
 /// Modes of a class.
 const MODES: usize = 2;
 /// Starts of the search for the modes of a class, the heaviest votes apart from each other.
 const STARTS: usize = 3;
 /// Most votes of a class; more are thinned evenly.
 const VOTES: usize = 256;
-/// Iterations of the mean shift, and the step that ends it, metres.
+/// Most iterations of the mean shift.
 const ITERATIONS: usize = 12;
-/// See [`ITERATIONS`].
-const SETTLED: f32 = 0.002;
-/// Least weight of a mode as a share of the first mode of its class.
-const LEAST_MODE: f32 = 0.1;
 
 /// A proposed joint.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -53,7 +44,8 @@ pub(super) struct ModeScratch {
 
 impl ModeScratch {
     /// Collects the votes of all cells, each displaced by the leaves' mean way to the joint (Girshick et al., ICCV 2011).
-    pub(super) fn gather(&mut self, person: &PersonCells<'_>, map: &ClassMap) {
+    /// Shares below `least_share` do not vote.
+    pub(super) fn gather(&mut self, person: &PersonCells<'_>, map: &ClassMap, least_share: f32) {
         self.votes.resize(map.classes, Vec::new());
         self.votes.iter_mut().for_each(Vec::clear);
         for (i, &cell) in person.cells.iter().enumerate() {
@@ -61,7 +53,7 @@ impl ModeScratch {
             let area = p.z * p.z;
             let [right, down, away] = ray_axes(&p, &person.up);
             for (c, &share) in map.shares(i).iter().enumerate() {
-                if share >= LEAST_SHARE {
+                if share >= least_share {
                     let way = map.offsets[i * map.classes + c].map(|o| o * OFFSET_UNIT / share);
                     self.votes[c].push(Vote {
                         at: p + right * way[0] + down * way[1] + away * way[2],
@@ -82,10 +74,11 @@ struct KernelSums {
     mean: P3,
 }
 
-fn kernel_sums(votes: &[Vote], at: &P3) -> KernelSums {
+fn kernel_sums(votes: &[Vote], at: &P3, radius: f32) -> KernelSums {
+    let scale = 1.0 / (radius * radius);
     let (mut weight, mut share, mut sum) = (0.0, 0.0, nalgebra::Vector3::zeros());
     for v in votes {
-        let d = (v.at - at).norm_squared() * (1.0 / (RADIUS * RADIUS));
+        let d = (v.at - at).norm_squared() * scale;
         if d < 1.0 {
             let w = (1.0 - d) * (1.0 - d) * v.weight;
             weight += w;
@@ -101,25 +94,25 @@ fn kernel_sums(votes: &[Vote], at: &P3) -> KernelSums {
 }
 
 /// Climbs from a vote to its mode.
-fn climb(votes: &[Vote], mut at: P3) -> (P3, KernelSums) {
-    let mut sums = kernel_sums(votes, &at);
+fn climb(votes: &[Vote], mut at: P3, settings: &PartVoteSettings) -> (P3, KernelSums) {
+    let mut sums = kernel_sums(votes, &at, settings.radius);
     for _ in 0..ITERATIONS {
         let step = (sums.mean - at).norm();
         at = sums.mean;
-        if step < SETTLED {
+        if step < settings.settled {
             break;
         }
-        sums = kernel_sums(votes, &at);
+        sums = kernel_sums(votes, &at, settings.radius);
     }
     (at, sums)
 }
 
 /// Modes of one class, the heaviest first.
-fn class_modes(votes: &[Vote]) -> Vec<(P3, KernelSums)> {
+fn class_modes(votes: &[Vote], settings: &PartVoteSettings) -> Vec<(P3, KernelSums)> {
     let mut modes: Vec<(P3, KernelSums)> = Vec::new();
     let mut starts: Vec<P3> = Vec::new();
     for _ in 0..STARTS {
-        let free = |v: &&Vote| starts.iter().all(|s| (s - v.at).norm() > RADIUS);
+        let free = |v: &&Vote| starts.iter().all(|s| (s - v.at).norm() > settings.radius);
         let heaviest = votes
             .iter()
             .filter(free)
@@ -128,26 +121,29 @@ fn class_modes(votes: &[Vote]) -> Vec<(P3, KernelSums)> {
             break;
         };
         starts.push(start);
-        let (at, sums) = climb(votes, start);
-        if modes.iter().all(|m| (m.0 - at).norm() > SAME_MODE) {
+        let (at, sums) = climb(votes, start, settings);
+        if modes.iter().all(|m| (m.0 - at).norm() > settings.same_mode) {
             modes.push((at, sums));
         }
     }
     modes.sort_by(|a, b| b.1.weight.total_cmp(&a.1.weight));
     modes.truncate(MODES);
     let most = modes.first().map_or(0.0, |m| m.1.weight);
-    modes.retain(|m| m.1.weight >= LEAST_MODE * most);
+    modes.retain(|m| m.1.weight >= settings.least_mode * most);
     modes
 }
 
 /// Modes of all classes.
-pub(super) fn find_modes(scratch: &mut ModeScratch) -> Vec<JointProposal> {
+pub(super) fn find_modes(
+    scratch: &mut ModeScratch,
+    settings: &PartVoteSettings,
+) -> Vec<JointProposal> {
     let mut out = Vec::new();
     for (class, all) in scratch.votes.iter().enumerate() {
         let stride = all.len().div_ceil(VOTES).max(1);
         scratch.thinned.clear();
         scratch.thinned.extend(all.iter().step_by(stride));
-        let modes = class_modes(&scratch.thinned);
+        let modes = class_modes(&scratch.thinned, settings);
         let total: f32 = modes.iter().map(|m| m.1.weight).sum();
         for (position, sums) in modes {
             out.push(JointProposal {
@@ -177,7 +173,7 @@ mod tests {
             votes: vec![vec![], near.chain(far).collect()],
             thinned: vec![],
         };
-        let found = find_modes(&mut scratch);
+        let found = find_modes(&mut scratch, &PartVoteSettings::default());
         assert_eq!(found.len(), 2);
         assert!(found.iter().all(|p| p.class == 1));
         assert!((found[0].position.x - 0.019).abs() < 1e-3, "{found:?}");

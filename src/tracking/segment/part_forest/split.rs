@@ -4,21 +4,14 @@
 use super::feature::DepthFeature;
 use super::training_set::{LabelledCell, TrainingSet};
 use super::yaw::{NO_YAW, YAW_BINS, bin};
+use crate::settings::ForestSpec;
 use rand::{Rng, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 
 /// Features of one task of the search.
 pub(super) const CHUNK: usize = 16;
-/// Shortest and longest offset, centimetres, drawn evenly in its logarithm.
-const OFFSETS: [f32; 2] = [3.0, 125.0];
-/// Share of unary features.
-const UNARY: f64 = 0.4;
 /// Most cells by which the splits of a node compare; more change no choice that matters.
 const MOST_CELLS: usize = 20_000;
-/// Weight of the information about yaw beside that about the class; a choice without a measurement.
-const YAW_WEIGHT: f64 = 0.3;
-/// Least gain of a split, bits × cells.
-const LEAST_GAIN: f64 = 1e-6;
 
 /// A split and its gain.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -29,11 +22,11 @@ pub(super) struct SplitChoice {
     pub(super) threshold: i16,
 }
 
-/// Sizes of the search.
+/// Search for the splits of one tree.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct SplitSearch {
     pub(super) classes: usize,
-    pub(super) thresholds: usize,
+    pub(super) spec: ForestSpec,
     pub(super) seed: u64,
 }
 
@@ -56,14 +49,15 @@ pub(super) fn gain(all: &[u32], below: &[u32]) -> f64 {
 }
 
 /// A random feature.
-fn draw(rng: &mut Pcg64Mcg) -> DepthFeature {
+fn draw(rng: &mut Pcg64Mcg, spec: &ForestSpec) -> DepthFeature {
+    let [shortest, longest] = spec.offsets;
     let offset = |rng: &mut Pcg64Mcg| {
-        let radius = OFFSETS[0] * (OFFSETS[1] / OFFSETS[0]).powf(rng.random::<f32>());
+        let radius = shortest * (longest / shortest).powf(rng.random::<f32>());
         let angle = std::f32::consts::TAU * rng.random::<f32>();
         [radius * angle.cos(), radius * angle.sin()].map(|x| x.round() as i8)
     };
     let first = offset(rng);
-    let second = if rng.random_bool(UNARY) {
+    let second = if rng.random_bool(spec.unary) {
         [0, 0]
     } else {
         offset(rng)
@@ -77,17 +71,17 @@ impl SplitSearch {
         let mut rng = Pcg64Mcg::seed_from_u64(self.seed ^ task.wrapping_mul(0x9e37_79b9_7f4a_7c15));
         let n = members.len().min(MOST_CELLS);
         let member = |k: usize| &set.cells[members[k * members.len() / n] as usize];
-        let features: Vec<DepthFeature> = (0..CHUNK).map(|_| draw(&mut rng)).collect();
+        let features: Vec<DepthFeature> = (0..CHUNK).map(|_| draw(&mut rng, &self.spec)).collect();
         let thresholds: Vec<Vec<i16>> = features
             .iter()
             .map(|f| {
-                let at = (0..self.thresholds).map(|_| rng.random_range(0..n));
+                let at = (0..self.spec.thresholds).map(|_| rng.random_range(0..n));
                 let mut t: Vec<i16> = at.map(|k| set.response(*f, member(k))).collect();
                 t.sort_unstable();
                 t
             })
             .collect();
-        let (bins, width) = (self.thresholds + 1, self.width());
+        let (bins, width) = (self.spec.thresholds + 1, self.width());
         let mut counts = vec![0u32; CHUNK * bins * width];
         for k in 0..n {
             let cell = member(k);
@@ -141,8 +135,9 @@ impl SplitSearch {
                 continue;
             }
             let k = self.classes;
-            let gain = gain(&all[..k], &below[..k]) + YAW_WEIGHT * gain(&all[k..], &below[k..]);
-            if gain > best.gain.max(LEAST_GAIN) {
+            let gain =
+                gain(&all[..k], &below[..k]) + self.spec.yaw_weight * gain(&all[k..], &below[k..]);
+            if gain > best.gain.max(self.spec.least_gain) {
                 *best = SplitChoice {
                     gain,
                     feature,

@@ -7,40 +7,8 @@ use super::forest::PartForest;
 use super::split::{CHUNK, SplitChoice, SplitSearch};
 use super::training_set::TrainingSet;
 use super::tree::{DecisionTree, LEAF, LeafCounts, SplitNode};
+use crate::settings::{ForestSpec, PartVoteSettings};
 use tryon_geometry::par::{self, Par};
-
-/// Sizes of a forest and of the search for its splits.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct ForestSpec {
-    /// Number of trees; time of a frame and size grow with it.
-    pub trees: usize,
-    /// Splits from the root to the deepest leaf.
-    pub depth: usize,
-    /// Most split nodes of a tree; the splits of least gain fall away first. 44 bytes a split.
-    pub splits: usize,
-    /// Random features per node.
-    pub features: usize,
-    /// Random thresholds per feature.
-    pub thresholds: usize,
-    /// Fewest cells of a node that is split.
-    pub least_cells: usize,
-    /// Seed of all random numbers.
-    pub seed: u64,
-}
-
-impl Default for ForestSpec {
-    fn default() -> Self {
-        Self {
-            trees: 3,
-            depth: 18,
-            splits: 27_000,
-            features: 112,
-            thresholds: 10,
-            least_cells: 16,
-            seed: 1,
-        }
-    }
-}
 
 /// A node whose split is being searched.
 #[derive(Clone, Copy)]
@@ -82,7 +50,7 @@ pub fn train(
             spec,
             search: SplitSearch {
                 classes,
-                thresholds: spec.thresholds,
+                spec: *spec,
                 seed: spec
                     .seed
                     .wrapping_add(t as u64)
@@ -96,7 +64,11 @@ pub fn train(
         grower.grow(&mut |share| progress((t as f64 + share) / spec.trees as f64));
         trees.push(grower.tree);
     }
-    PartForest { classes, trees }
+    PartForest {
+        classes,
+        trees,
+        settings: PartVoteSettings::default(),
+    }
 }
 
 impl Grower<'_> {
@@ -201,7 +173,7 @@ impl Grower<'_> {
             counts.add(cell.class, cell.sector, cell.offset);
         }
         let index = self.tree.leaves.len() as u32;
-        self.tree.leaves.push(counts.shares());
+        self.tree.leaves.push(counts.shares(self.spec));
         self.link(node, index | LEAF);
     }
 }
@@ -261,20 +233,23 @@ mod tests {
         set
     }
 
-    const SPEC: ForestSpec = ForestSpec {
-        trees: 2,
-        depth: 4,
-        splits: 15,
-        features: 64,
-        thresholds: 10,
-        least_cells: 4,
-        seed: 3,
-    };
+    fn spec() -> ForestSpec {
+        ForestSpec {
+            trees: 2,
+            depth: 4,
+            splits: 15,
+            features: 64,
+            thresholds: 10,
+            least_cells: 4,
+            seed: 3,
+            ..ForestSpec::default()
+        }
+    }
 
     #[test]
     fn a_tree_separates_the_halves_of_a_bar() {
         let set = training();
-        let forest = train(&set, 2, &SPEC, Par::Seq, &mut |_| {});
+        let forest = train(&set, 2, &spec(), Par::Seq, &mut |_| {});
         let (cloud, cells, labelled) = bar(9);
         let mut scratch = PartScratch::default();
         let map = forest.classify(&person(&cloud, &cells), &mut scratch);
@@ -293,7 +268,7 @@ mod tests {
     #[test]
     fn forests_are_the_same_for_any_number_of_threads() {
         let set = training();
-        let bytes = |par| train(&set, 2, &SPEC, par, &mut |_| {}).to_bytes();
+        let bytes = |par| train(&set, 2, &spec(), par, &mut |_| {}).to_bytes();
         let alone = bytes(Par::Seq);
         for threads in [1, 2, 3] {
             let got = with_threads(threads, || bytes(Par::Rayon)).expect("pool");
@@ -308,7 +283,7 @@ mod tests {
     #[test]
     fn nothing_in_nothing_out() {
         let set = TrainingSet::default();
-        let forest = train(&set, 1, &SPEC, Par::Seq, &mut |_| {});
+        let forest = train(&set, 1, &spec(), Par::Seq, &mut |_| {});
         let (cloud, _, _) = bar(0);
         let mut scratch = PartScratch::default();
         assert!(

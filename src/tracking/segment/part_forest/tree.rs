@@ -2,6 +2,7 @@
 
 use super::feature::{DepthFeature, DepthWindow, ProbeFrame};
 use super::yaw::{NO_YAW, YAW_BINS, bin, is_front};
+use crate::settings::ForestSpec;
 
 /// Classes of a leaf that are kept; 98 % of the weight of a leaf at depth 16.
 pub(super) const KEPT: usize = 4;
@@ -9,10 +10,6 @@ pub(super) const KEPT: usize = 4;
 pub(super) const LEAF: u32 = 1 << 23;
 /// Unit of the ways to joints, metres; the longest way is 127 of them.
 pub(super) const OFFSET_UNIT: f32 = 0.005;
-/// Cells that each bin of yaw has in advance: no leaf excludes a yaw.
-const YAW_PRIOR: f32 = 0.5;
-/// Cells that front and back have in advance in each class of a leaf.
-const FRONT_PRIOR: f32 = 0.5;
 
 /// Inner node: responses below the threshold (millimetres) go to the first child.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -78,7 +75,7 @@ impl LeafCounts {
         }
     }
     /// The leaf.
-    pub(super) fn shares(&self) -> LeafShares {
+    pub(super) fn shares(&self, spec: &ForestSpec) -> LeafShares {
         let count = |c: usize| self.classes[c].iter().sum::<u32>();
         let mut order: Vec<usize> = (0..self.classes.len()).filter(|c| count(*c) > 0).collect();
         order.sort_by(|a, b| count(*b).cmp(&count(*a)).then(a.cmp(b)));
@@ -86,7 +83,7 @@ impl LeafCounts {
         let mut out = LeafShares::default();
         for (slot, c) in out.classes.iter_mut().zip(order) {
             let [front, back, _] = self.classes[c].map(|n| n as f32);
-            let front = (front + FRONT_PRIOR) / (front + back + 2.0 * FRONT_PRIOR);
+            let front = (front + spec.front_prior) / (front + back + 2.0 * spec.front_prior);
             *slot = ClassShare {
                 class: c as u8,
                 share: ((u64::from(count(c)) * 255 + sum / 2) / sum) as u8,
@@ -94,8 +91,8 @@ impl LeafCounts {
                 offset: self.offsets[c].map(|s| (s as f32 / count(c) as f32).round() as i8),
             };
         }
-        let total = self.yaw.iter().sum::<u32>() as f32 + YAW_PRIOR * YAW_BINS as f32;
-        let share = |n: u32| (255.0 * (n as f32 + YAW_PRIOR) / total + 0.5).max(1.0) as u8;
+        let total = self.yaw.iter().sum::<u32>() as f32 + spec.yaw_prior * YAW_BINS as f32;
+        let share = |n: u32| (255.0 * (n as f32 + spec.yaw_prior) / total + 0.5).max(1.0) as u8;
         out.yaw = self.yaw.map(share);
         out
     }
@@ -138,7 +135,7 @@ mod tests {
                 )
             });
         }
-        let leaf = counts.shares();
+        let leaf = counts.shares(&ForestSpec::default());
         let kept = leaf.classes.map(|c| (c.class, c.share));
         assert_eq!(kept, [(2, 153), (4, 51), (1, 26), (3, 13)]);
         assert_eq!(leaf.classes[0].front, 190, "45.5 of 61");
@@ -151,7 +148,7 @@ mod tests {
             [1, -3, 100],
             "a half away from zero"
         );
-        let nothing = LeafCounts::new(3).shares();
+        let nothing = LeafCounts::new(3).shares(&ForestSpec::default());
         assert_eq!(nothing.classes, [ClassShare::default(); KEPT]);
         assert_eq!(nothing.yaw, [32; 8]);
     }

@@ -6,9 +6,6 @@ pub const YAW_BINS: usize = 8;
 pub(super) const YAW_SECTORS: u8 = 16;
 /// Label of a person without a yaw, one who lies.
 pub(super) const NO_YAW: u8 = u8::MAX;
-/// Number of independent votes that the cells of one person are worth: neighbours repeat each other. Larger beliefs are
-/// too sure, smaller ones undecided; a choice without a measurement.
-const INDEPENDENT_VOTES: f32 = 10.0;
 
 /// Sector of a yaw in radians; [`NO_YAW`] without one.
 pub(super) fn sector(yaw: Option<f64>) -> u8 {
@@ -38,12 +35,12 @@ pub struct YawBelief {
 }
 
 impl YawBelief {
-    /// Belief of votes: sums of the logarithms of the bins' probabilities over so many cells.
-    pub(super) fn of_votes(logs: &[f32; YAW_BINS], cells: usize) -> Self {
+    /// Belief of votes: sums of the logarithms of the bins' probabilities over so many cells, worth `independent` votes.
+    pub(super) fn of_votes(logs: &[f32; YAW_BINS], cells: usize, independent: f32) -> Self {
         if cells == 0 {
             return Self::default();
         }
-        let scale = INDEPENDENT_VOTES / cells as f32;
+        let scale = independent / cells as f32;
         let most = logs.iter().copied().fold(f32::NEG_INFINITY, f32::max);
         let mut bins = logs.map(|l| ((l - most) * scale).exp());
         let sum: f32 = bins.iter().sum();
@@ -87,9 +84,12 @@ mod tests {
     fn belief_is_normalised_and_even_without_votes() {
         let mut logs = [-4.0f32 * 50.0; 8];
         logs[4] = -50.0;
-        let belief = YawBelief::of_votes(&logs, 50);
+        let belief = YawBelief::of_votes(&logs, 50, 10.0);
         assert!((belief.bins.iter().sum::<f32>() - 1.0).abs() < 1e-6);
         assert!(belief.bins[4] > 0.99 && belief.front_and_back()[1] > 0.99);
-        assert_eq!(YawBelief::of_votes(&logs, 0).front_and_back(), [0.5; 2]);
+        assert_eq!(
+            YawBelief::of_votes(&logs, 0, 10.0).front_and_back(),
+            [0.5; 2]
+        );
     }
 }
