@@ -23,8 +23,6 @@ pub(super) struct ArmCoordinates {
 const SLICES: usize = 5;
 /// Octants around the axis that a sleeve must cover.
 const SLEEVE_OCTANTS: u32 = 6;
-/// Largest distance of a sleeve from the axis, metres.
-const SLEEVE_RADIUS: f32 = 0.10;
 /// Largest x component of an axis whose cross product with x is well conditioned.
 const MAX_PARALLEL: f32 = 0.6;
 
@@ -51,8 +49,8 @@ impl ArmAxis {
     }
 
     /// End of the sleeve: 0 at the elbow, 1 at the wrist. A sleeve surrounds the arm; a shirt under an arm lies on one
-    /// side of it.
-    pub(super) fn sleeve_end(&self, garments: &[P3]) -> f32 {
+    /// side of it, or is farther than `radius` (metres) from the axis.
+    pub(super) fn sleeve_end(&self, garments: &[P3], radius: f32) -> f32 {
         let forearm = self.wrist - self.elbow;
         let axis = forearm.normalize();
         let helper = if axis.x.abs() < MAX_PARALLEL {
@@ -67,7 +65,7 @@ impl ArmAxis {
             let d = p - self.elbow;
             let t = d.dot(&axis) / forearm.norm();
             let (x, y) = (d.dot(&side), d.dot(&other));
-            if (0.0..1.0).contains(&t) && x * x + y * y < SLEEVE_RADIUS * SLEEVE_RADIUS {
+            if (0.0..1.0).contains(&t) && x * x + y * y < radius * radius {
                 let octant = usize::from(x < 0.0) * 4
                     + usize::from(y < 0.0) * 2
                     + usize::from(x.abs() < y.abs());
@@ -131,9 +129,9 @@ mod tests {
                     )
             })
             .collect();
-        assert_eq!(axis.sleeve_end(&tube), 0.6);
+        assert_eq!(axis.sleeve_end(&tube, 0.1), 0.6);
         let half: Vec<P3> = tube.into_iter().filter(|p| p.y > 0.0).collect();
-        assert_eq!(axis.sleeve_end(&half), 0.0);
-        assert_eq!(axis.sleeve_end(&[]), 0.0);
+        assert_eq!(axis.sleeve_end(&half, 0.1), 0.0);
+        assert_eq!(axis.sleeve_end(&[], 0.1), 0.0);
     }
 }

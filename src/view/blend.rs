@@ -50,19 +50,19 @@ impl Blender<'_> {
         if p.covered == 0 && work.shadows.is_far(x, y) {
             return;
         }
-        let contact = self.shader.lights.contact;
+        let lights = &self.shader.lights;
         let around = work.shadows.at(x, y);
         let full = 1.0 / (self.samples * self.samples) as f32;
         let alpha = work.matte.alpha[i];
         let cover = f32::from(p.covered) * full * (1.0 - alpha);
         let mut behind = [0, 1, 2].map(|c| f32::from(out[c]));
         if cover < 1.0 {
-            let light = around.on_captured(contact, self.depth.at(x, y), alpha);
+            let light = around.on_captured(lights, self.depth.at(x, y), alpha);
             behind = behind.map(|c| c * light);
         }
         let mut color = [0.0; 3];
         if cover > 0.0 {
-            color = self.garment_color(cache, p, [x, y], contact * around.front);
+            color = self.garment_color(cache, p, [x, y], lights.contact * around.front);
         }
         for c in 0..3 {
             out[c] = (behind[c] + (color[c] - behind[c]) * cover + 0.5) as u8;

@@ -1,6 +1,7 @@
 //! Pass one: the captured picture at the output's size, and the brightness of the room.
 
 use super::input::Input;
+use super::settings::ExposureSettings;
 use super::srgb::linear;
 use super::viewport::Viewport;
 use tryon_geometry::camera::{ColorImage, DepthImage};
@@ -108,19 +109,13 @@ fn grey_depth(depth: &DepthImage, viewport: &Viewport) -> ColorImage {
     out
 }
 
-/// A bright but not blown-out surface (skin, a light wall) in a well exposed room, linear light.
-const WELL_EXPOSED: f32 = 0.26;
-/// Share of the measured pixels that are darker than the one compared with [`WELL_EXPOSED`].
-const BRIGHT_PERCENTILE: f32 = 0.85;
-/// Least and greatest light on garments: black clothes on a black ground carry little information about the room.
-const BRIGHTNESS_RANGE: [f32; 2] = [0.45, 1.25];
 /// Weights of red, green and blue in luma, of 256 (ITU-R BT.709).
 const LUMA: [u32; 3] = [54, 183, 19];
 /// Stride of measured rows and columns, pixels.
 const MEASURE_STEP: usize = 4;
 
 /// Brightness of the room, the factor of the light on garments, from the captured pixels that have depth.
-pub(crate) fn brightness(input: &Input<'_>) -> f32 {
+pub(crate) fn brightness(input: &Input<'_>, settings: &ExposureSettings) -> f32 {
     let Some(color) = &input.frame.color else {
         return 1.0;
     };
@@ -146,12 +141,12 @@ pub(crate) fn brightness(input: &Input<'_>) -> f32 {
         .iter()
         .position(|n| {
             below += n;
-            below as f32 >= BRIGHT_PERCENTILE * total as f32
+            below as f32 >= settings.bright_percentile * total as f32
         })
         .unwrap_or(255);
-    (linear(level as u8) / WELL_EXPOSED)
+    (linear(level as u8) / settings.well_exposed)
         .sqrt()
-        .clamp(BRIGHTNESS_RANGE[0], BRIGHTNESS_RANGE[1])
+        .clamp(settings.range[0], settings.range[1])
 }
 
 #[cfg(test)]

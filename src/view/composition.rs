@@ -11,6 +11,7 @@ use super::input::{Input, RenderError};
 use super::matte::MatteInput;
 use super::off_person::{OffPerson, OffPersonInput};
 use super::report::{HandReport, RenderReport};
+use super::settings::{BareArmSettings, OffPersonSettings};
 use super::silhouette_grid::DressedArea;
 use super::state::State;
 use super::viewport::Viewport;
@@ -20,8 +21,6 @@ use std::time::Instant;
 use tryon_geometry::camera::ColorImage;
 use tryon_geometry::par;
 
-/// Reach of a contact shadow across the picture, metres.
-const SHADOW_REACH: f32 = 0.025;
 /// Side of the tiles that are counted as drawn or skipped, pixels.
 const TILE: u32 = 32;
 /// Rows of the drawn area tested by one task.
@@ -62,7 +61,7 @@ impl<'a> Composition<'a> {
             image: captured(config.par, input, &viewport),
             depth: depth_from_picture(input, &viewport),
             report: RenderReport {
-                brightness: brightness(input),
+                brightness: brightness(input, &config.exposure),
                 ..RenderReport::default()
             },
             area: None,
@@ -73,7 +72,7 @@ impl<'a> Composition<'a> {
         };
         composition.lap("captured");
         work.surface.build(input, config);
-        let reach = SHADOW_REACH * viewport.camera.fx as f32 / work.surface.distance;
+        let reach = config.lights.contact_reach * viewport.camera.fx as f32 / work.surface.distance;
         composition.shadow_reach = reach;
         composition.area = work.surface.area(&viewport, 2.0 * reach + 2.0);
         Ok(composition)
@@ -103,12 +102,13 @@ impl<'a> Composition<'a> {
         collect_evidence(model, work, area, &depth, is_tracked);
         self.lap("evidence");
         if is_tracked {
-            self.report.hands = self.find_hands(state, input, work, area);
+            self.report.hands = self.find_hands(&config.bare_arms, state, input, work, area);
             self.lap("hands");
         }
         self.report.specks_dropped = work.matte.decide(&MatteInput {
             par: config.par,
             margins: &config.margins,
+            settings: &config.matte,
             viewport: &self.viewport,
             area,
             distance: work.surface.distance,
@@ -123,7 +123,8 @@ impl<'a> Composition<'a> {
         self.lap("shadows");
 
         if state.begin_off_person(config.off_person_interval, input.frame.time_ns) {
-            self.report.off_person = self.measure_off_person(input, work, area, &depth);
+            self.report.off_person =
+                self.measure_off_person(&config.off_person, input, work, area, &depth);
             self.lap("off person");
         }
         depth
@@ -132,6 +133,7 @@ impl<'a> Composition<'a> {
     /// Measures the garments off the person in the picture.
     fn measure_off_person(
         &self,
+        settings: &OffPersonSettings,
         input: &Input<'_>,
         work: &Workspace,
         area: &Area,
@@ -149,6 +151,7 @@ impl<'a> Composition<'a> {
         };
         OffPerson::measure(&OffPersonInput {
             camera: &self.viewport.camera,
+            settings,
             dressed,
             body,
         })
@@ -157,6 +160,7 @@ impl<'a> Composition<'a> {
     /// Marks bare hands and forearms in front of loose cloth, by their colour.
     fn find_hands(
         &self,
+        settings: &BareArmSettings,
         state: &mut State,
         input: &Input<'_>,
         work: &mut Workspace,
@@ -177,6 +181,7 @@ impl<'a> Composition<'a> {
                 vertices: depths.vertices(input, &body),
             },
             garments: &work.surface.vertices,
+            settings,
             area,
             layers: |x: usize, y: usize| LayerDepths {
                 garment: pixels[y * width + x].depth,

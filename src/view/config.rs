@@ -1,8 +1,10 @@
 //! Settings of the compositor; immutable while a session runs.
 
+use super::settings::{BareArmSettings, ExposureSettings, MatteSettings, OffPersonSettings};
 use super::srgb::ToSrgb;
 use serde::{Deserialize, Serialize};
 use tryon_geometry::par::Par;
+use tryon_geometry::settings;
 
 /// Fit of the captured picture into an output of another aspect ratio. Proportions are always kept.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default, Serialize, Deserialize)]
@@ -14,69 +16,55 @@ pub enum Framing {
     Contain,
 }
 
-/// Light in the room, in units in which a white wall facing the camera comes out as about 0.9.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Lights {
-    /// Direction of "up" in the camera's frame; the default suits a level camera.
-    pub up: [f32; 3],
-    /// Light from above (ceiling).
-    pub sky: f32,
-    /// Light from below (floor).
-    pub ground: f32,
-    /// Towards the key lamp, camera frame.
-    pub key_direction: [f32; 3],
-    /// Strength of the key lamp.
-    pub key: f32,
-    /// Share of the light on the inner side of a garment (neck hole, sleeve ends).
-    pub inside: f32,
-    /// Strength of contact shadows: of a garment on what lies behind its edge, of an arm on the cloth; 0 = none.
-    pub contact: f32,
-}
-
-impl Default for Lights {
-    fn default() -> Self {
-        Self {
-            up: [0.0, -1.0, 0.0],
-            sky: 0.66,
-            ground: 0.36,
-            key_direction: [-0.35, -0.62, -0.70],
-            key: 0.52,
-            inside: 0.42,
-            contact: 0.4,
-        }
+settings! {
+    /// Light in the room, in units in which a white wall facing the camera comes out as about 0.9.
+    pub struct Lights {
+        /// Direction of "up" in the camera's frame; the default suits a level camera.
+        pub up: [f32; 3] = [0.0, -1.0, 0.0],
+        /// Light from above (ceiling).
+        pub sky: f32 = 0.66,
+        /// Light from below (floor).
+        pub ground: f32 = 0.36,
+        /// Towards the key lamp, camera frame.
+        pub key_direction: [f32; 3] = [-0.35, -0.62, -0.70],
+        /// Strength of the key lamp.
+        pub key: f32 = 0.52,
+        /// Share of the light on the inner side of a garment (neck hole, sleeve ends).
+        pub inside: f32 = 0.42,
+        /// Strength of contact shadows: of a garment on what lies behind its edge, of an arm on the cloth; 0 = none.
+        pub contact: f32 = 0.4,
+        /// Reach of a contact shadow across the picture, metres.
+        pub contact_reach: f32 = 0.025,
+        /// Reach of a contact shadow behind a garment's edge, metres.
+        pub contact_depth: f32 = 0.10,
+        /// Ambient light lost in a fold whose flanks rise at 45°.
+        pub fold_shade: f32 = 0.9,
+        /// Least and greatest openness.
+        pub openness: [f32; 2] = [0.6, 1.08],
     }
-}
 
-/// Depth margins by which a captured pixel hides a garment, metres, on top of twice the sensor's noise at that depth.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Margins {
-    /// Margin if nothing is known about the body.
-    pub plain: f32,
-    /// Margin if the tracked body itself is in front (an arm).
-    pub limb: f32,
-    /// Margin if the tracked body lies under the garment: own clothes and hair bulge by this much.
-    pub covered: f32,
-    /// Margin on the inner side of a garment, which is behind the body wherever there is a body.
-    pub inner: f32,
-    /// Further excess that some pixel of a patch must reach, else the patch counts as bulging clothes.
-    pub clear: f32,
-    /// Step in captured depth at an occluder's edge, on top of the noise.
-    pub step: f32,
-    /// Smallest patch, square metres; smaller ones are noise.
-    pub patch: f32,
-}
-
-impl Default for Margins {
-    fn default() -> Self {
-        Self {
-            plain: 0.012,
-            limb: 0.004,
-            covered: 0.035,
-            inner: 0.004,
-            clear: 0.012,
-            step: 0.012,
-            patch: 6e-4,
-        }
+    /// Depth margins by which a captured pixel hides a garment, metres, on top of twice the sensor's noise at that depth.
+    pub struct Margins {
+        /// Margin if nothing is known about the body.
+        pub plain: f32 = 0.012,
+        /// Margin if the tracked body itself is in front (an arm).
+        pub limb: f32 = 0.004,
+        /// Margin if the tracked body lies under the garment: own clothes and hair bulge by this much.
+        pub covered: f32 = 0.035,
+        /// Margin on the inner side of a garment, which is behind the body wherever there is a body.
+        pub inner: f32 = 0.004,
+        /// Further excess that some pixel of a patch must reach, else the patch counts as bulging clothes.
+        pub clear: f32 = 0.012,
+        /// Step in captured depth at an occluder's edge, on top of the noise.
+        pub step: f32 = 0.012,
+        /// Smallest patch, square metres; smaller ones are noise.
+        pub patch: f32 = 6e-4,
+        /// Least distance of the tracked body in front of the garment, metres; less is body that touches the garment over it.
+        pub limb_gap: f32 = 0.02,
+        /// Standard deviations of sensor noise added to every margin.
+        pub noise_sigmas: f32 = 2.0,
+        /// Share of a patch's edge on a depth step below which the patch belongs to the body under the garment.
+        pub smooth_share: f32 = 0.35,
     }
 }
 
@@ -109,6 +97,14 @@ pub struct Config {
     /// Seconds of the capture clock between two measurements of garments off the person
     /// ([`RenderReport::off_person`](super::RenderReport::off_person)); 0 = every picture, infinity = never.
     pub off_person_interval: f64,
+    /// Brightness of the room.
+    pub exposure: ExposureSettings,
+    /// Matte of the captured scene.
+    pub matte: MatteSettings,
+    /// Bare hands and forearms.
+    pub bare_arms: BareArmSettings,
+    /// Garments off the person.
+    pub off_person: OffPersonSettings,
 }
 
 impl Config {
@@ -131,6 +127,10 @@ impl Default for Config {
             skip_hidden: true,
             skip_unseen: true,
             off_person_interval: 0.2,
+            exposure: ExposureSettings::default(),
+            matte: MatteSettings::default(),
+            bare_arms: BareArmSettings::default(),
+            off_person: OffPersonSettings::default(),
         }
     }
 }

@@ -1,13 +1,10 @@
 //! Contact shadows between garments and what they touch: blurred coverage at half resolution.
 
 use super::area::Area;
+use super::config::Lights;
 
-/// Reach of a contact shadow behind a garment's edge, metres.
-pub(crate) const SHADOW_DEPTH: f32 = 0.10;
-/// Share of [`SHADOW_DEPTH`] by which noise may put a shadowed pixel in front of the garment.
+/// Share of `Lights::contact_depth` by which noise may put a shadowed pixel in front of the garment.
 const SHADOW_FRONT: f32 = 0.2;
-/// Share of one pixel in a cell of the half-resolution image.
-const QUARTER: f32 = 0.25;
 /// Largest radius of the blur, cells.
 const MAX_RADIUS: f32 = 16.0;
 /// Garment share below which no shadow is visible (one grey level at full contact).
@@ -37,16 +34,16 @@ pub(crate) struct ShadowSample {
 impl ShadowSample {
     /// Light left on a captured pixel at depth `z` (metres, 0 = unknown) that is in front of a garment by `alpha`.
     #[inline]
-    pub(crate) fn on_captured(&self, contact: f32, z: f32, alpha: f32) -> f32 {
+    pub(crate) fn on_captured(&self, lights: &Lights, z: f32, alpha: f32) -> f32 {
         if self.garment < NO_SHADOW || z <= 0.0 {
             return 1.0;
         }
-        let gap = z - self.depth / self.garment;
-        if !(-SHADOW_FRONT * SHADOW_DEPTH..=SHADOW_DEPTH).contains(&gap) {
+        let (gap, depth) = (z - self.depth / self.garment, lights.contact_depth);
+        if !(-SHADOW_FRONT * depth..=depth).contains(&gap) {
             return 1.0;
         }
-        let fade = 1.0 - (gap / SHADOW_DEPTH).max(0.0);
-        1.0 - contact * self.garment * fade * (1.0 - alpha)
+        let fade = 1.0 - (gap / depth).max(0.0);
+        1.0 - lights.contact * self.garment * fade * (1.0 - alpha)
     }
 }
 
@@ -63,13 +60,14 @@ impl ContactShadows {
         (self.width, self.height) = (width.div_ceil(2), area.height.div_ceil(2) as usize);
         self.around.clear();
         self.around.resize(self.width * self.height, [0.0; 4]);
+        // A cell has four pixels.
         for (i, ([cover, depth], a)) in pixels.zip(alpha).enumerate() {
             if cover > 0.0 {
                 let slot = &mut self.around[i / width / 2 * self.width + i % width / 2];
-                let visible = QUARTER * cover * (1.0 - a);
+                let visible = 0.25 * cover * (1.0 - a);
                 slot[0] += visible;
                 slot[1] += visible * depth;
-                slot[2] += QUARTER * a;
+                slot[2] += 0.25 * a;
             }
         }
         let radius = (0.25 * reach).round().clamp(1.0, MAX_RADIUS) as usize;

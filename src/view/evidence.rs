@@ -44,11 +44,6 @@ pub(crate) struct PixelDepths {
     pub(crate) is_tracked: bool,
 }
 
-/// Least distance of the tracked body in front of the garment, metres; less is body that touches the garment over it.
-const LIMB_GAP: f32 = 0.02;
-/// Standard deviations of sensor noise added to every margin.
-const NOISE_SIGMAS: f32 = 2.0;
-
 /// Standard deviation of captured depth at `z` metres, metres.
 pub(crate) fn depth_sigma(z: f32) -> f32 {
     kinect_v1_axial_sigma(z, 0.0)
@@ -61,7 +56,7 @@ impl Evidence {
         if p.garment == f32::INFINITY {
             return Self::Outside;
         }
-        let is_limb = p.body < p.garment - LIMB_GAP;
+        let is_limb = p.body < p.garment - m.limb_gap;
         if p.captured <= 0.0 {
             // A sleeve's far end lies behind the tracked arm and beside the real one: colour decides there.
             return if is_limb && !p.is_inner {
@@ -79,7 +74,7 @@ impl Evidence {
         } else {
             m.plain
         };
-        let gap = p.garment - p.captured - margin - NOISE_SIGMAS * depth_sigma(p.captured);
+        let gap = p.garment - p.captured - margin - m.noise_sigmas * depth_sigma(p.captured);
         match () {
             () if gap <= 0.0 => Self::Garment,
             () if is_limb || p.is_inner => Self::Limb,
@@ -104,7 +99,7 @@ mod tests {
             is_tracked: false,
         };
         let of = |p: PixelDepths| Evidence::of(&margins, &p);
-        let at = |gap: f32| 2.0 - gap - NOISE_SIGMAS * depth_sigma(2.0 - gap);
+        let at = |gap: f32| 2.0 - gap - margins.noise_sigmas * depth_sigma(2.0 - gap);
         assert_eq!(of(plain), Evidence::Garment);
         let captured = at(margins.plain + 0.5 * margins.clear);
         assert_eq!(of(PixelDepths { captured, ..plain }), Evidence::Front);

@@ -80,6 +80,7 @@ mod occluder;
 mod off_person;
 mod render;
 mod report;
+mod settings;
 pub(crate) mod shading;
 mod silhouette_grid;
 mod skin;
@@ -100,5 +101,8 @@ pub use limbs::Limbs;
 pub use off_person::OffPerson;
 pub use render::render;
 pub use report::{HandReport, RenderReport};
+pub use settings::{
+    BareArmSettings, ExposureSettings, LimbSettings, MatteSettings, OffPersonSettings, SkinSettings,
+};
 pub use state::State;
 pub use workspace::Workspace;

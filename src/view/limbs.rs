@@ -1,6 +1,7 @@
 //! Body parts by vertex, and the vertices of forearms, hands, face and trunk, on the body template.
 
 use super::arm::ArmAxis;
+use super::settings::LimbSettings;
 use tryon_body::Template;
 use tryon_body::parts::{BodyPart, BodySegment, LimbJoints};
 use tryon_geometry::math::{P3, V3};
@@ -26,16 +27,10 @@ pub(super) struct Arm {
     pub(super) rings: [Vec<u32>; 3],
 }
 
-/// Half the length of the rings at elbow, wrist and tips, as a share of the forearm.
-const RING: f64 = 0.08;
-/// Height range of the face, as shares of the head's extent upwards from the chin.
-const FACE: [f32; 2] = [0.2, 0.6];
-/// Front part of the head that is the face, as a share of its depth.
-const FACE_FRONT: f32 = 0.75;
-
 impl Limbs {
     /// The limbs of a template whose joints have SMPL's names; empty for others, which disables the detection of hands.
     pub fn of(template: &Template) -> Self {
+        let settings = LimbSettings::default();
         let (parts, weights) = (template.parts(), template.weights());
         let vertices = template.mesh().vertices().len();
         let mut out = Self {
@@ -49,10 +44,10 @@ impl Limbs {
             let Some(joints) = parts.limb(side) else {
                 return Self::default();
             };
-            *arm = Arm::of(template, side, &joints);
+            *arm = Arm::of(template, side, &joints, &settings);
         }
         use BodySegment::{Abdomen, Chest, Head, Pelvis, Thigh};
-        out.face = front_of_face(template, &moved_by(template, |s| s == Head));
+        out.face = front_of_face(template, &moved_by(template, |s| s == Head), &settings);
         out.trunk = moved_by(template, |s| [Pelvis, Abdomen, Chest, Thigh].contains(&s));
         out
     }
@@ -71,7 +66,7 @@ impl Limbs {
 
 impl Arm {
     /// Vertices of one side's arm below the elbow, by their dominant joint.
-    fn of(template: &Template, side: BodyPart, arm: &LimbJoints) -> Self {
+    fn of(template: &Template, side: BodyPart, arm: &LimbJoints, settings: &LimbSettings) -> Self {
         let (joints, parts) = (template.skeleton().joints(), template.parts());
         let rest = template.mesh().vertices();
         let owner = |v: u32| template.weights().dominant(v as usize);
@@ -85,7 +80,7 @@ impl Arm {
         let vertices: Vec<u32> = (0..rest.len() as u32).filter(is_below).collect();
         let reach = vertices.iter().map(|&v| share(v)).fold(0.0, f64::max);
         let ring = |at: f64| {
-            let near = |v: &u32| (share(*v) - at).abs() < RING;
+            let near = |v: &u32| (share(*v) - at).abs() < settings.ring;
             vertices.iter().copied().filter(near).collect()
         };
         let rings = [0.0, 1.0, reach].map(ring);
@@ -127,7 +122,7 @@ fn moved_by(template: &Template, is_wanted: impl Fn(BodySegment) -> bool) -> Vec
 }
 
 /// Front of the face, without brow and chin, among the vertices of the head.
-fn front_of_face(template: &Template, head: &[u32]) -> Vec<u32> {
+fn front_of_face(template: &Template, head: &[u32], settings: &LimbSettings) -> Vec<u32> {
     let at = |v: u32| template.mesh().vertices()[v as usize];
     let extent = |axis: usize| {
         head.iter()
@@ -135,10 +130,12 @@ fn front_of_face(template: &Template, head: &[u32]) -> Vec<u32> {
                 [lo.min(at(v)[axis]), hi.max(at(v)[axis])]
             })
     };
+    let [low, high] = settings.face;
     let ([y0, y1], [z0, z1]) = (extent(1), extent(2));
     let is_face = |v: &u32| {
         let p = at(*v);
-        (FACE[0]..FACE[1]).contains(&((p.y - y0) / (y1 - y0))) && p.z - z0 > FACE_FRONT * (z1 - z0)
+        (low..high).contains(&((p.y - y0) / (y1 - y0)))
+            && p.z - z0 > settings.face_front * (z1 - z0)
     };
     head.iter().copied().filter(is_face).collect()
 }

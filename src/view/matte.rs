@@ -4,24 +4,17 @@ use super::area::Area;
 use super::config::Margins;
 use super::evidence::Evidence;
 use super::occluder::{FloodScratch, PatchCriteria, drop_specks};
+use super::settings::MatteSettings;
 use super::viewport::Viewport;
 use tryon_geometry::camera::ColorImage;
 use tryon_geometry::par::{self, Par};
 
-/// Distance from a patch's edge at which depths are compared, depth pixels: flying pixels lie in between.
-const EDGE_STEP: f64 = 3.0;
-/// Colour difference (sum over channels) at which a neighbour's weight is e⁻¹.
-const COLOR_SCALE: f32 = 48.0;
 /// Largest colour difference.
 const MAX_DIFFERENCE: usize = 3 * 255;
-/// Radius of the soft edge in depth pixels: the misalignment of depth and colour edges that it must bridge.
-const EDGE_RADIUS: f64 = 3.0;
 /// Least and greatest radius of the soft edge, output pixels.
 const RADIUS_RANGE: [i32; 2] = [2, 8];
 /// Radius above which every second pixel is sampled, output pixels.
 const DENSE_RADIUS: i32 = 4;
-/// Vote share that maps to 0; one minus it maps to 1. Sharpens: half-way votes are edges, not transparent arms.
-const CERTAIN_SHARE: f32 = 0.25;
 /// Rows of the picture softened by one task.
 const ROWS: usize = 8;
 
@@ -39,6 +32,7 @@ pub(crate) struct Matte {
 pub(crate) struct MatteInput<'a> {
     pub(crate) par: Par,
     pub(crate) margins: &'a Margins,
+    pub(crate) settings: &'a MatteSettings,
     pub(crate) viewport: &'a Viewport,
     pub(crate) area: &'a Area,
     /// Median distance of the garments, metres.
@@ -54,12 +48,13 @@ impl Matte {
     pub(crate) fn decide(&mut self, input: &MatteInput<'_>) -> usize {
         let camera = &input.viewport.camera;
         let pixel_area = input.distance * input.distance / (camera.fx * camera.fy) as f32;
-        let edge_distance = EDGE_STEP * input.viewport.pixels_per_depth();
+        let edge_distance = input.settings.edge_step * input.viewport.pixels_per_depth();
         let criteria = PatchCriteria {
             width: input.area.width as usize,
             smallest: (input.margins.patch / pixel_area).ceil() as usize,
             edge_distance: edge_distance.round().max(1.0) as usize,
             step: input.margins.step,
+            smooth_share: input.margins.smooth_share,
             depth: input.depth,
         };
         let dropped = drop_specks(&mut self.evidence, &criteria, &mut self.patches);
@@ -83,22 +78,25 @@ struct SoftEdge<'a> {
     guide: &'a ColorImage,
     radius: i32,
     stride: usize,
+    certain_share: f32,
     /// Weight by colour difference.
     weights: Vec<f32>,
 }
 
 impl<'a> SoftEdge<'a> {
     fn new(evidence: &'a [Evidence], input: &MatteInput<'a>) -> Self {
-        let radius = (EDGE_RADIUS * input.viewport.pixels_per_depth()).round() as i32;
+        let radius =
+            (input.settings.edge_radius * input.viewport.pixels_per_depth()).round() as i32;
         let radius = radius.clamp(RADIUS_RANGE[0], RADIUS_RANGE[1]);
         Self {
             evidence,
             area: input.area,
             guide: input.guide,
             radius,
+            certain_share: input.settings.certain_share,
             stride: if radius > DENSE_RADIUS { 2 } else { 1 },
             weights: (0..=MAX_DIFFERENCE)
-                .map(|d| (-(d as f32 / COLOR_SCALE).powi(2)).exp())
+                .map(|d| (-(d as f32 / input.settings.color_scale).powi(2)).exp())
                 .collect(),
         }
     }
@@ -169,6 +167,7 @@ impl<'a> SoftEdge<'a> {
             }
         }
         let share: f32 = if total > 0.0 { front / total } else { 0.0 };
-        ((share - CERTAIN_SHARE) / (1.0 - 2.0 * CERTAIN_SHARE)).clamp(0.0, 1.0)
+        let certain = self.certain_share;
+        ((share - certain) / (1.0 - 2.0 * certain)).clamp(0.0, 1.0)
     }
 }

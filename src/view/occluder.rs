@@ -4,8 +4,6 @@
 
 use super::evidence::{Evidence, depth_sigma};
 
-/// Share of a patch's edge on a depth step below which the patch belongs to the body under the garment.
-const SMOOTH_SHARE: f32 = 0.35;
 /// A patch with at least one limb pixel in so many is an arm, however smooth its edge.
 const LIMB_RATIO: usize = 3;
 
@@ -20,6 +18,8 @@ pub(super) struct PatchCriteria<'a> {
     pub(super) edge_distance: usize,
     /// Depth step of an edge, metres, on top of the noise.
     pub(super) step: f32,
+    /// Share of a patch's edge on such a step below which the patch belongs to the body under the garment.
+    pub(super) smooth_share: f32,
     /// Captured depth, metres, 0 = none; shape `[area]`.
     pub(super) depth: &'a [f32],
 }
@@ -60,7 +60,7 @@ pub(super) fn drop_specks(
         let s = grow(seed, evidence, criteria, scratch);
         let size = scratch.patch.len();
         let is_smooth =
-            (s.steps as f32) < SMOOTH_SHARE * s.edges as f32 && LIMB_RATIO * s.limb < size;
+            (s.steps as f32) < criteria.smooth_share * s.edges as f32 && LIMB_RATIO * s.limb < size;
         if !s.has_clear_front || is_smooth || size < criteria.smallest {
             dropped += size;
             for &i in &scratch.patch {
@@ -140,6 +140,7 @@ impl PatchCriteria<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::Margins;
 
     const SIDE: usize = 20;
 
@@ -160,6 +161,7 @@ mod tests {
             smallest: 16,
             edge_distance: 1,
             step: 0.012,
+            smooth_share: Margins::default().smooth_share,
             depth: &depth,
         };
         let dropped = drop_specks(&mut evidence, &criteria, &mut FloodScratch::default());
@@ -195,6 +197,7 @@ mod tests {
                     smallest: 1,
                     edge_distance: 1,
                     step: 0.0,
+                    smooth_share: Margins::default().smooth_share,
                     depth: &[],
                 },
                 &mut FloodScratch::default()

@@ -5,18 +5,13 @@
 
 use super::area::NEAR;
 use super::hand::PosedLimbs;
+use super::settings::OffPersonSettings;
 use super::silhouette_grid::{DressedArea, PersonBounds, SilhouetteGrid};
 use tryon_body::parts::BodyPart;
 use tryon_geometry::camera::Intrinsics;
 
 /// Number of [`BodyPart`]s.
 const PARTS: usize = BodyPart::ALL.len();
-/// Distance from the person above which a garment pixel is off it, metres: the cloth of tops hangs closer.
-const RADIUS: f32 = 0.04;
-/// Difference from the garments' depth within which a reading is the person, metres: arms reach that far.
-const PERSON_DEPTH: f32 = 0.7;
-/// Smallest garment that is measured, square metres: less is the end of a sleeve at the picture's edge.
-const SMALLEST: f32 = 0.02;
 /// Vertices of the body compared with a patch of cloth, about: one each 4 cm of skin.
 const VERTICES: usize = 1024;
 
@@ -35,6 +30,7 @@ pub struct OffPerson {
 /// Data of a measurement.
 pub(super) struct OffPersonInput<'a> {
     pub(super) camera: &'a Intrinsics,
+    pub(super) settings: &'a OffPersonSettings,
     pub(super) dressed: DressedArea<'a>,
     /// The tracked body.
     pub(super) body: Option<PosedLimbs<'a>>,
@@ -54,15 +50,16 @@ impl OffPerson {
     pub(super) fn measure(input: &OffPersonInput<'_>) -> Option<Self> {
         let (camera, dressed) = (input.camera, &input.dressed);
         let middle = dressed.median_depth()?;
-        let radius = RADIUS * camera.fx as f32 / middle;
+        let radius = input.settings.radius * camera.fx as f32 / middle;
         let person = PersonBounds {
             middle,
-            reach: PERSON_DEPTH,
+            reach: input.settings.person_depth,
+            cells: input.settings.cells,
         };
         let grid = SilhouetteGrid::new(dressed, &person, radius);
         let garment_pixels = grid.garment_pixels();
         let pixel_area = middle * middle / (camera.fx * camera.fy) as f32;
-        if garment_pixels as f32 * pixel_area < SMALLEST {
+        if garment_pixels as f32 * pixel_area < input.settings.smallest {
             return None;
         }
 

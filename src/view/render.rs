@@ -33,7 +33,7 @@ pub fn render(
     reduce_samples(config.par, surface, &area, n, &mut work.pixels);
     picture.report.garments_hidden = surface.garments_hidden();
     picture.lap("garments");
-    picture.report.normals_skipped = surface.shade_vertices();
+    picture.report.normals_skipped = surface.shade_vertices(&config.lights);
     picture.lap("normals");
 
     let depth = picture.resolve_visibility(model, state, input, work, &area);

@@ -8,10 +8,6 @@ use super::coverage::PixelCoverage;
 use std::ops::Range;
 use tryon_geometry::math::order_statistics::median;
 
-/// Share of alpha from which a pixel shows the captured scene in front of the garment.
-const HIDDEN: f32 = 0.5;
-/// Cells along the radius, at least, where pixels are that small. An edge is right to half a cell, and without bias.
-const CELLS: f32 = 12.0;
 /// Largest side of a cell, pixels: the pixels of one are counted in 16 bits.
 const MAX_STRIDE: usize = 255;
 /// Pixels that the median depth is taken of, about: it is right to a millimetre.
@@ -35,6 +31,8 @@ pub(super) struct PersonBounds {
     pub(super) middle: f32,
     /// Largest difference from `middle`.
     pub(super) reach: f32,
+    /// Least number of cells along the radius of a measurement, where pixels are that small.
+    pub(super) cells: f32,
 }
 
 /// Garment and person by cell. A cell with any pixel of the person is one of the person, so that thin limbs count. Edges lie
@@ -84,7 +82,7 @@ impl DressedArea<'_> {
 impl SilhouetteGrid {
     /// Cells of an area that are small against `radius` pixels.
     pub(super) fn new(dressed: &DressedArea<'_>, person: &PersonBounds, radius: f32) -> Self {
-        let stride = ((radius / CELLS) as usize).clamp(1, MAX_STRIDE);
+        let stride = ((radius / person.cells) as usize).clamp(1, MAX_STRIDE);
         let columns = dressed.area.width as usize;
         let width = columns.div_ceil(stride);
         let cells = width * (dressed.area.height as usize).div_ceil(stride);
@@ -171,7 +169,7 @@ fn count(marks: &[u16], stride: usize, cells: &mut [u16]) {
 
 /// The picture shows a garment here.
 fn is_garment(pixel: &PixelCoverage, alpha: f32) -> bool {
-    (pixel.covered > 0) & (alpha < HIDDEN)
+    (pixel.covered > 0) & (alpha < 0.5)
 }
 
 /// Some column near column `x` of a row has a gap within its reach.
@@ -203,6 +201,7 @@ mod tests {
     use super::*;
 
     const PERSON: PersonBounds = PersonBounds {
+        cells: 12.0,
         middle: 2.0,
         reach: 0.7,
     };

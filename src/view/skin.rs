@@ -3,6 +3,7 @@
 //! Skin is one normal distribution of brightness and chroma, clothes a mixture of [`KINDS`] (shirt, trousers, their
 //! shadows).
 
+use super::settings::SkinSettings;
 use tryon_geometry::math::order_statistics::medians;
 
 /// Least number of tones of a class.
@@ -26,20 +27,14 @@ struct Gaussian {
     log: f32,
 }
 
-/// Least standard deviation of brightness and chroma, grey levels: sensor noise and shading of folds.
-const MIN_SIGMA: [f32; 3] = [8.0, 2.5, 2.5];
-/// Logarithm of the density of clothes of an unknown colour, everywhere; larger rejects more skin.
-const UNKNOWN_CLOTHES: f32 = -18.0;
 /// Mixture components of clothes; two miss the shadows of a bright shirt.
 const KINDS: usize = 4;
-/// Weight of brightness against chroma in clustering: one cloth in light and shade is one or two components.
-const BRIGHTNESS: f32 = 0.3;
 /// Iterations of Lloyd's algorithm.
 const ITERATIONS: usize = 6;
 
 impl Gaussian {
-    /// Maximum likelihood with [`MIN_SIGMA`] added to the covariance; `weight` is the component's share.
-    fn of(tones: &[[f32; 3]], weight: f32) -> Self {
+    /// Maximum likelihood with `min_sigma` added to the covariance; `weight` is the component's share.
+    fn of(tones: &[[f32; 3]], weight: f32, min_sigma: &[f32; 3]) -> Self {
         let n = tones.len().max(1) as f32;
         let mean = tones
             .iter()
@@ -57,9 +52,9 @@ impl Gaussian {
             }
         }
         (s[0], s[2], s[5]) = (
-            s[0] + MIN_SIGMA[0].powi(2),
-            s[2] + MIN_SIGMA[1].powi(2),
-            s[5] + MIN_SIGMA[2].powi(2),
+            s[0] + min_sigma[0].powi(2),
+            s[2] + min_sigma[1].powi(2),
+            s[5] + min_sigma[2].powi(2),
         );
         // Cholesky; the least deviations keep the pivots positive.
         let l00 = s[0].sqrt();
@@ -108,11 +103,17 @@ const KEPT: [usize; 2] = [9, 10];
 pub(super) struct SkinClassifier {
     skin: Gaussian,
     clothes: Vec<Gaussian>,
+    /// Logarithm of the density of clothes of an unknown colour.
+    unknown_clothes: f32,
 }
 
 impl SkinClassifier {
     /// Fits tones of skin and of everything else; `None` when there are too few.
-    pub(super) fn fit(skin: &[[f32; 3]], clothes: &[[f32; 3]]) -> Option<Self> {
+    pub(super) fn fit(
+        skin: &[[f32; 3]],
+        clothes: &[[f32; 3]],
+        settings: &SkinSettings,
+    ) -> Option<Self> {
         if skin.len() < MIN_TONES || clothes.len() < MIN_TONES {
             return None;
         }
@@ -123,8 +124,9 @@ impl SkinClassifier {
         kept.sort_by(|a, b| off(a).total_cmp(&off(b)));
         kept.truncate(skin.len() * KEPT[0] / KEPT[1]);
         Some(Self {
-            skin: Gaussian::of(&kept, 1.0),
-            clothes: cluster(clothes),
+            skin: Gaussian::of(&kept, 1.0, &settings.min_sigma),
+            clothes: cluster(clothes, settings),
+            unknown_clothes: settings.unknown_clothes,
         })
     }
 
@@ -132,7 +134,7 @@ impl SkinClassifier {
     #[inline]
     pub(super) fn is_skin(&self, c: &[f32; 3]) -> bool {
         let skin = self.skin.log_density(c);
-        skin > UNKNOWN_CLOTHES && self.clothes.iter().all(|k| k.log_density(c) < skin)
+        skin > self.unknown_clothes && self.clothes.iter().all(|k| k.log_density(c) < skin)
     }
 }
 
@@ -140,24 +142,24 @@ impl SkinClassifier {
 const SPECK: usize = 8;
 
 /// Squared distance of two tones in clustering.
-fn squared_distance(a: &[f32; 3], b: &[f32; 3]) -> f32 {
-    (BRIGHTNESS * (a[0] - b[0])).powi(2) + (a[1] - b[1]).powi(2) + (a[2] - b[2]).powi(2)
+fn squared_distance(a: &[f32; 3], b: &[f32; 3], brightness: f32) -> f32 {
+    (brightness * (a[0] - b[0])).powi(2) + (a[1] - b[1]).powi(2) + (a[2] - b[2]).powi(2)
 }
 
 /// Mixture components of the tones of clothes: farthest-point seeds, then k-means.
-fn cluster(tones: &[[f32; 3]]) -> Vec<Gaussian> {
-    let mut centres = farthest_points(tones);
+fn cluster(tones: &[[f32; 3]], settings: &SkinSettings) -> Vec<Gaussian> {
+    let mut centres = farthest_points(tones, settings.brightness);
     let mut members = vec![Vec::new(); centres.len()];
     for _ in 0..ITERATIONS {
         members.iter_mut().for_each(Vec::clear);
         for c in tones {
-            let distance = |k: &usize| squared_distance(c, &centres[*k]);
+            let distance = |k: &usize| squared_distance(c, &centres[*k], settings.brightness);
             let best = (0..centres.len()).min_by(|a, b| distance(a).total_cmp(&distance(b)));
             members[best.unwrap_or(0)].push(*c);
         }
         for (centre, of) in centres.iter_mut().zip(&members) {
             if !of.is_empty() {
-                *centre = Gaussian::of(of, 1.0).mean;
+                *centre = Gaussian::of(of, 1.0, &settings.min_sigma).mean;
             }
         }
     }
@@ -165,18 +167,18 @@ fn cluster(tones: &[[f32; 3]]) -> Vec<Gaussian> {
     members
         .iter()
         .filter(|of| of.len() >= SPECK)
-        .map(|of| Gaussian::of(of, share(of)))
+        .map(|of| Gaussian::of(of, share(of), &settings.min_sigma))
         .collect()
 }
 
 /// Up to [`KINDS`] tones, each the farthest from those before it.
-fn farthest_points(tones: &[[f32; 3]]) -> Vec<[f32; 3]> {
+fn farthest_points(tones: &[[f32; 3]], brightness: f32) -> Vec<[f32; 3]> {
     let mut centres = vec![tones[0]];
     let mut nearest = vec![f32::INFINITY; tones.len()];
     while centres.len() < KINDS {
         let last = centres[centres.len() - 1];
         for (n, c) in nearest.iter_mut().zip(tones) {
-            *n = n.min(squared_distance(c, &last));
+            *n = n.min(squared_distance(c, &last, brightness));
         }
         let farthest = (0..tones.len()).max_by(|&a, &b| nearest[a].total_cmp(&nearest[b]));
         let Some(k) = farthest else { break };
@@ -206,9 +208,10 @@ mod tests {
 
     #[test]
     fn skin_is_separated_from_two_clothes() {
+        let settings = SkinSettings::default();
         let mut clothes = spread(SHIRT, 40);
         clothes.extend(spread(TROUSERS, 40));
-        let c = SkinClassifier::fit(&spread(SKIN, 40), &clothes).expect("enough tones");
+        let c = SkinClassifier::fit(&spread(SKIN, 40), &clothes, &settings).expect("enough tones");
         assert!(c.is_skin(&tone(SKIN)));
         assert!(!c.is_skin(&tone(SHIRT)) && !c.is_skin(&tone(TROUSERS)));
         assert!(
@@ -219,13 +222,13 @@ mod tests {
 
     #[test]
     fn few_or_equal_tones_are_degenerate_but_finite() {
-        assert_eq!(
-            SkinClassifier::fit(&spread(SKIN, 11), &spread(SHIRT, 40)),
-            None
-        );
-        assert_eq!(SkinClassifier::fit(&spread(SKIN, 40), &[]), None);
-        let one = Gaussian::of(&[tone(SKIN); 20], 1.0);
+        let settings = SkinSettings::default();
+        let fit =
+            |skin: &[[f32; 3]], clothes: &[[f32; 3]]| SkinClassifier::fit(skin, clothes, &settings);
+        assert_eq!(fit(&spread(SKIN, 11), &spread(SHIRT, 40)), None);
+        assert_eq!(fit(&spread(SKIN, 40), &[]), None);
+        let one = Gaussian::of(&[tone(SKIN); 20], 1.0, &settings.min_sigma);
         assert!(one.log_density(&tone(SKIN)).is_finite());
-        assert_eq!(cluster(&[tone(SHIRT); 20]).len(), 1);
+        assert_eq!(cluster(&[tone(SHIRT); 20], &settings).len(), 1);
     }
 }

@@ -1,12 +1,8 @@
 //! Memory between pictures: colours of one user's skin and clothes, time of the last measurement.
 
+use super::settings::SkinSettings;
 use super::skin::{MIN_TONES, SkinClassifier, tone};
 use serde::{Deserialize, Serialize};
-
-/// Least share of the face or the hands that is like the forearms, which makes them skin: to begin, to go on.
-const AGREE: [f32; 2] = [0.5, 0.4];
-/// Largest share of the trunk that is like skin (a neckline, an unexpected hand): to begin, to go on.
-const MIXED: [f32; 2] = [0.08, 0.14];
 
 /// Memory between pictures. Of colours one a place of the body: the classifier is fitted to the last few pictures.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -86,13 +82,13 @@ impl State {
     }
 
     /// Fits the classifier; `None` if colour does not separate skin from clothes. Once a picture, after its colours.
-    pub(super) fn fit_skin(&mut self) -> Option<SkinClassifier> {
+    pub(super) fn fit_skin(&mut self, settings: &SkinSettings) -> Option<SkinClassifier> {
         self.pictures = self.pictures.saturating_add(1);
         let tones = |s: ColorRegion| -> Vec<[f32; 3]> {
             self.colors[s as usize].iter().flatten().copied().collect()
         };
         let (arms, trunk) = (tones(ColorRegion::Forearm), tones(ColorRegion::Trunk));
-        let skin = SkinClassifier::fit(&arms, &trunk);
+        let skin = SkinClassifier::fit(&arms, &trunk, settings);
         let usable = skin.as_ref().is_some_and(|skin| {
             let share = |s: ColorRegion| {
                 let colors = tones(s);
@@ -104,7 +100,7 @@ impl State {
                 }
             };
             let hysteresis = usize::from(self.usable);
-            let (agree, mixed) = (AGREE[hysteresis], MIXED[hysteresis]);
+            let (agree, mixed) = (settings.agree[hysteresis], settings.mixed[hysteresis]);
             share(ColorRegion::Forearm) >= agree
                 && share(ColorRegion::Face).max(share(ColorRegion::Hand)) >= agree
                 && share(ColorRegion::Trunk) <= mixed

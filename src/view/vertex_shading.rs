@@ -1,21 +1,17 @@
 //! Vertex attributes of visible faces: normals, openness in folds, sides.
 
+use super::config::Lights;
 use super::surface::Surface;
 use tryon_geometry::math::V3;
 use tryon_geometry::mesh::face_normal;
 
-/// Ambient light lost in a fold whose flanks rise at 45°.
-const FOLD_SHADE: f32 = 0.9;
-/// Least and greatest openness.
-const OPENNESS: [f32; 2] = [0.6, 1.08];
-
 impl Surface {
     /// Fills `attributes` and `inner` of the visible faces; returns the number of vertices without one. Sums run over
     /// the same faces in the same order whatever is visible, so their bits equal those of a picture that shows all.
-    pub(crate) fn shade_vertices(&mut self) -> usize {
+    pub(crate) fn shade_vertices(&mut self, lights: &Lights) -> usize {
         self.find_visible();
         self.compute_normals();
-        self.compute_openness();
+        self.compute_openness(lights);
         self.write_attributes()
     }
 
@@ -58,7 +54,7 @@ impl Surface {
     }
 
     /// Openness of the visible vertices: less where their neighbours rise above the tangent plane.
-    fn compute_openness(&mut self) {
+    fn compute_openness(&mut self, lights: &Lights) {
         let (openness, edges) = (&mut self.scratch.openness, &mut self.scratch.edges);
         openness.clear();
         openness.resize(self.vertices.len(), 0.0);
@@ -77,8 +73,9 @@ impl Surface {
                 edges[j] = edges[j].saturating_add(1);
             }
         }
+        let [least, most] = lights.openness;
         for (o, n) in openness.iter_mut().zip(edges) {
-            *o = (1.0 - FOLD_SHADE * *o / f32::from((*n).max(1))).clamp(OPENNESS[0], OPENNESS[1]);
+            *o = (1.0 - lights.fold_shade * *o / f32::from((*n).max(1))).clamp(least, most);
         }
     }
 

@@ -3,7 +3,7 @@
 use crate::ImagePyramid;
 use crate::appearance::{Fabric, Print};
 use crate::area::{Area, NEAR};
-use crate::contact_shadow::{ContactShadows, NO_SHADOW, SHADOW_DEPTH};
+use crate::contact_shadow::{ContactShadows, NO_SHADOW};
 use crate::coverage::FOLD_GAP;
 use crate::shading::Shader;
 use crate::surface::Surface;
@@ -55,7 +55,7 @@ impl SceneData {
             up: [shader.up.x, shader.up.y, shader.up.z, l.sky],
             key: [shader.key.x, shader.key.y, shader.key.z, l.key],
             light: [l.ground, l.inside, l.contact, shader.brightness],
-            limits: [FOLD_GAP, SHADOW_DEPTH, NO_SHADOW, behind],
+            limits: [FOLD_GAP, l.contact_depth, NO_SHADOW, behind],
         }
     }
 }

@@ -142,7 +142,7 @@ impl Renderer {
             return Ok(picture.end(work));
         };
         work.surface.visible.reset(work.surface.faces.len(), true);
-        work.surface.shade_vertices();
+        work.surface.shade_vertices(&model.config.lights);
         self.upload(model, &picture, &area, work);
         let targets = self.take_targets(&area, picture.samples);
         let passes = self.passes(&targets, area, picture.samples);

@@ -1,33 +1,16 @@
 //! Detection of bare arms: skin-coloured cells grown from the tracked arm.
 
-use super::grid::{ArmGrid, FOREARM_REACH, HAND_REACH};
+use super::grid::ArmGrid;
 use super::sampling::{CapturedPixels, PosedLimbs, sample_and_fit};
 use crate::area::{Area, NEAR};
 use crate::arm::ArmAxis;
 use crate::evidence::{Evidence, depth_sigma};
 use crate::report::HandReport;
+use crate::settings::BareArmSettings;
 use crate::skin::{SkinClassifier, tone};
 use crate::state::State;
 use tryon_geometry::camera::ColorImage;
 use tryon_geometry::math::P3;
-
-/// Distance from the axis below which skin colour seeds a region, metres.
-const SEED_DISTANCE: f32 = 0.045;
-/// Share of the forearm next to the elbow that is left to depth: a sleeve may end there.
-const ELBOW: f32 = 0.15;
-/// Largest depth difference of neighbours on one surface, metres a pixel of depth, on top of the noise.
-const STEP: f32 = 0.015;
-/// Distance of cloth in front of a hand above which it really is in front (a wide skirt), metres. A shirt that falls
-/// straight over the waist hangs up to 10 cm in front of a hand on the hip.
-const LOOSE: f32 = 0.12;
-/// Distance behind the tracked trunk above which skin is no hand on it, metres.
-const BEHIND: f32 = 0.03;
-/// Share of a region at the end of the reach above which its colour has leaked into clothes.
-const LEAK: f32 = 0.2;
-/// Share of the reach beyond which a cell lies at its end.
-const END: f32 = 0.88;
-/// Smallest region, square metres.
-const SMALLEST: f32 = 4e-4;
 
 /// State of one cell during detection.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -68,6 +51,7 @@ pub(crate) struct ArmScene<'a, F> {
     /// Vertices of the garments in the picture's camera, metres.
     pub(crate) garments: &'a [P3],
     pub(crate) area: &'a Area,
+    pub(crate) settings: &'a BareArmSettings,
     /// Depths at column and row of the area.
     pub(crate) layers: F,
 }
@@ -99,14 +83,16 @@ impl HandDetector {
         if report.tested == 0 {
             return report;
         }
-        let Some(skin) = sample_and_fit(state, &scene.view, body, &axes) else {
+        let Some(skin) = sample_and_fit(state, &scene.view, body, &axes, scene.settings) else {
             return report;
         };
         report.known = true;
         let arms = axes.map(|axis| {
             axis.map(|axis| BareArm {
                 axis,
-                bare_from: axis.sleeve_end(scene.garments).max(ELBOW),
+                bare_from: axis
+                    .sleeve_end(scene.garments, scene.settings.sleeve_radius)
+                    .max(scene.settings.elbow),
             })
         });
         for (side, grid) in grids.iter().enumerate() {
@@ -139,11 +125,12 @@ impl HandDetector {
         self.cells.resize(n, Cell::Other);
         self.depth.resize(n, 0.0);
         self.is_far.resize(n, false);
+        let settings = *scene.settings;
         let (elbow, wrist) = (&arm.axis.elbow, &arm.axis.wrist);
-        let nearest = (elbow.z - FOREARM_REACH)
-            .min(wrist.z - HAND_REACH)
+        let nearest = (elbow.z - settings.forearm_reach)
+            .min(wrist.z - settings.hand_reach)
             .max(NEAR);
-        let farthest = (elbow.z + FOREARM_REACH).max(wrist.z + HAND_REACH);
+        let farthest = (elbow.z + settings.forearm_reach).max(wrist.z + settings.hand_reach);
         let view = &scene.view;
         for i in 0..n {
             let (x, y) = grid.pixel(i);
@@ -155,7 +142,8 @@ impl HandDetector {
             let p = view.viewport.camera.unproject(u as f32, v as f32, z);
             let at = arm.axis.coordinates(&p);
             // Share of the reach.
-            let out = (at.distance / FOREARM_REACH).min((p - wrist).norm() / HAND_REACH);
+            let out = (at.distance / settings.forearm_reach)
+                .min((p - wrist).norm() / settings.hand_reach);
             if at.along < arm.bare_from || out > 1.0 || !skin.is_skin(&tone(view.image.at(u, v))) {
                 continue;
             }
@@ -168,8 +156,8 @@ impl HandDetector {
                 continue;
             }
             self.depth[i] = z;
-            self.is_far[i] = out > END;
-            self.cells[i] = if at.distance < SEED_DISTANCE {
+            self.is_far[i] = out > settings.end;
+            self.cells[i] = if at.distance < settings.seed_distance {
                 Cell::Seed
             } else {
                 Cell::Skin
@@ -186,15 +174,15 @@ impl HandDetector {
     ) -> usize {
         let width = scene.area.width as usize;
         let pixels = grid.step as f64 / scene.view.viewport.pixels_per_depth();
-        let smallest = (SMALLEST / grid.cell_area).ceil() as usize;
+        let smallest = (scene.settings.smallest / grid.cell_area).ceil() as usize;
         let mut marked = 0;
         for seed in 0..self.cells.len() {
             if self.cells[seed] != Cell::Seed {
                 continue;
             }
-            let far = self.grow(grid, seed, STEP * pixels.max(1.0) as f32);
+            let far = self.grow(grid, seed, scene.settings.step * pixels.max(1.0) as f32);
             let size = self.region.len();
-            if size < smallest || far as f32 > LEAK * size as f32 {
+            if size < smallest || far as f32 > scene.settings.leak * size as f32 {
                 continue;
             }
             if !self.is_in_front(grid, scene, evidence) {
@@ -244,13 +232,14 @@ impl HandDetector {
         evidence: &[Evidence],
     ) -> bool {
         let width = scene.area.width as usize;
+        let BareArmSettings { loose, behind, .. } = *scene.settings;
         let (mut covered, mut front) = (0, 0);
         for &i in &self.region {
             let (x, y) = grid.pixel(i as usize);
             if evidence[y * width + x] != Evidence::Outside {
                 let (layers, z) = ((scene.layers)(x, y), self.depth[i as usize]);
                 covered += 1;
-                front += i32::from(z - layers.garment < LOOSE && z < layers.trunk + BEHIND);
+                front += i32::from(z - layers.garment < loose && z < layers.trunk + behind);
             }
         }
         2 * front >= covered
@@ -260,7 +249,7 @@ impl HandDetector {
 impl<F> ArmScene<'_, F> {
     /// The grid around an arm; `None` if no garment is near it.
     fn grid(&self, axis: &ArmAxis, evidence: &[Evidence]) -> Option<ArmGrid> {
-        let grid = ArmGrid::around(axis, self.view.viewport, self.area)?;
+        let grid = ArmGrid::around(axis, self.view.viewport, self.area, self.settings)?;
         let width = self.area.width as usize;
         let is_garment = |(x, y): (usize, usize)| evidence[y * width + x] != Evidence::Outside;
         (0..grid.len())

@@ -2,15 +2,8 @@
 
 use crate::area::Area;
 use crate::arm::ArmAxis;
+use crate::settings::BareArmSettings;
 use crate::viewport::Viewport;
-
-/// Largest distance of a forearm's skin from its tracked axis, metres: half its width, and the tracking error.
-pub(super) const FOREARM_REACH: f32 = 0.07;
-/// Largest distance of a hand's skin from the tracked wrist, metres: a hand's length. The tracked direction of a hand is
-/// unreliable: half of a real hand on a hip was 8 cm and more off the tracked axis, the wrist 2 cm.
-pub(super) const HAND_REACH: f32 = 0.21;
-/// Side of a cell, metres.
-const CELL: f32 = 0.004;
 
 /// Cells of a part of the drawn area, each decided as one.
 #[derive(Clone, Copy, Debug)]
@@ -27,10 +20,18 @@ pub(super) struct ArmGrid {
 
 impl ArmGrid {
     /// The grid around forearm and hand; `None` outside the area.
-    pub(super) fn around(axis: &ArmAxis, viewport: &Viewport, area: &Area) -> Option<Self> {
+    pub(super) fn around(
+        axis: &ArmAxis,
+        viewport: &Viewport,
+        area: &Area,
+        settings: &BareArmSettings,
+    ) -> Option<Self> {
         let (mut lo, mut hi) = ([f32::INFINITY; 2], [f32::NEG_INFINITY; 2]);
         let c = &viewport.camera;
-        for (p, reach) in [(axis.elbow, FOREARM_REACH), (axis.wrist, HAND_REACH)] {
+        for (p, reach) in [
+            (axis.elbow, settings.forearm_reach),
+            (axis.wrist, settings.hand_reach),
+        ] {
             if p.z < 2.0 * reach {
                 return None;
             }
@@ -44,7 +45,7 @@ impl ArmGrid {
         let (start, side) = ([area.left, area.top], [area.width, area.height]);
         let clip = |x: f32, k: usize| (x - start[k] as f32).clamp(0.0, side[k] as f32) as usize;
         let pixel = [axis.wrist.z / c.fx as f32, axis.wrist.z / c.fy as f32];
-        let step = ((CELL / pixel[0]).round() as usize).max(1);
+        let step = ((settings.cell / pixel[0]).round() as usize).max(1);
         let from = [0, 1].map(|k| clip(lo[k], k));
         let size = [0, 1].map(|k| (clip(hi[k], k) - from[k]) / step);
         let cell_area = pixel[0] * pixel[1] * (step * step) as f32;

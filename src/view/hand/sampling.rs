@@ -4,6 +4,7 @@ use crate::area::NEAR;
 use crate::arm::ArmAxis;
 use crate::evidence::depth_sigma;
 use crate::limbs::Limbs;
+use crate::settings::BareArmSettings;
 use crate::skin::SkinClassifier;
 use crate::state::{ColorRegion, State};
 use crate::viewport::Viewport;
@@ -25,15 +26,6 @@ pub(crate) struct PosedLimbs<'a> {
     pub(crate) vertices: &'a [P3],
 }
 
-/// Largest depth difference of a captured point on a tracked limb, metres: tracked limbs are right to 3 cm.
-const LIMB_TOLERANCE: f32 = 0.03;
-/// The same on the trunk, whose clothes hang loosely.
-const TRUNK_TOLERANCE: f32 = 0.06;
-/// Distance from an arm's axis within which nothing counts as trunk, metres.
-const ARM_CLEARANCE: f32 = 0.09;
-/// Distance of the four test points from a sampled point, depth pixels: rejects outlines.
-const SAMPLE_RADIUS: f64 = 2.0;
-
 impl CapturedPixels<'_> {
     /// Captured depth at a pixel, metres; 0 = none.
     pub(super) fn metres(&self, u: u32, v: u32) -> f32 {
@@ -42,13 +34,13 @@ impl CapturedPixels<'_> {
         f32::from(self.depth[(y * self.viewport.depth[0] + x) as usize]) * 1e-3
     }
 
-    /// Colour at `p` if the captured surface there and around it is the body's, within `tolerance` metres.
-    fn color(&self, p: &P3, tolerance: f32) -> Option<[u8; 3]> {
+    /// Colour at `p` if the captured surface there and around it is the body's, within `tolerance` metres; around it at `radius` depth pixels.
+    fn color(&self, p: &P3, tolerance: f32, radius: f64) -> Option<[u8; 3]> {
         if p.z.is_nan() || p.z <= NEAR {
             return None;
         }
         let q = self.viewport.camera.project(p);
-        let away = (SAMPLE_RADIUS * self.viewport.pixels_per_depth()) as f32;
+        let away = (radius * self.viewport.pixels_per_depth()) as f32;
         let is_inside = |x: f32, side: u32| x >= away && x + away + 1.0 < side as f32;
         if !is_inside(q.x, self.image.width()) || !is_inside(q.y, self.image.height()) {
             return None;
@@ -70,10 +62,11 @@ pub(super) fn sample_and_fit(
     view: &CapturedPixels<'_>,
     body: &PosedLimbs<'_>,
     axes: &[Option<ArmAxis>; 2],
+    settings: &BareArmSettings,
 ) -> Option<SkinClassifier> {
     let is_by_arm = |p: &P3| {
         let mut axes = axes.iter().flatten();
-        axes.any(|a| a.coordinates(p).distance < ARM_CLEARANCE)
+        axes.any(|a| a.coordinates(p).distance < settings.arm_clearance)
     };
     let mut sample = |region: ColorRegion, vertices: &[u32], tolerance: f32| {
         let due: Vec<(usize, u32)> = state.due(region, vertices).collect();
@@ -82,7 +75,7 @@ pub(super) fn sample_and_fit(
             if region == ColorRegion::Trunk && is_by_arm(p) {
                 continue;
             }
-            if let Some(rgb) = view.color(p, tolerance) {
+            if let Some(rgb) = view.color(p, tolerance, settings.sample_radius) {
                 state.put(region, slot, rgb);
             }
         }
@@ -90,9 +83,13 @@ pub(super) fn sample_and_fit(
     let [left, right] = &body.limbs.arms;
     let forearms = [&left.forearm[..], &right.forearm].concat();
     let hands = [&left.hand[..], &right.hand].concat();
-    sample(ColorRegion::Forearm, &forearms, LIMB_TOLERANCE);
-    sample(ColorRegion::Hand, &hands, LIMB_TOLERANCE);
-    sample(ColorRegion::Face, &body.limbs.face, LIMB_TOLERANCE);
-    sample(ColorRegion::Trunk, &body.limbs.trunk, TRUNK_TOLERANCE);
-    state.fit_skin()
+    sample(ColorRegion::Forearm, &forearms, settings.limb_tolerance);
+    sample(ColorRegion::Hand, &hands, settings.limb_tolerance);
+    sample(ColorRegion::Face, &body.limbs.face, settings.limb_tolerance);
+    sample(
+        ColorRegion::Trunk,
+        &body.limbs.trunk,
+        settings.trunk_tolerance,
+    );
+    state.fit_skin(&settings.skin)
 }

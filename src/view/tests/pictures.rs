@@ -32,6 +32,7 @@ fn only_the_arm_hides_the_shirt() {
                 clear: 0.0,
                 step: 0.0,
                 patch: 0.0,
+                ..Margins::default()
             };
             let naive = Model::new(Config {
                 margins: plain,

@@ -1,0 +1,103 @@
+//! Settings of the stages of a picture.
+
+use tryon_geometry::settings;
+
+settings! {
+    /// Settings of the brightness of the room.
+    pub struct ExposureSettings {
+        /// A bright but not blown-out surface (skin, a light wall) in a well exposed room, linear light.
+        pub well_exposed: f32 = 0.26,
+        /// Share of the measured pixels that are darker than the one compared with `well_exposed`.
+        pub bright_percentile: f32 = 0.85,
+        /// Least and greatest light on garments: black clothes on a black ground carry little information about the room.
+        pub range: [f32; 2] = [0.45, 1.25],
+    }
+
+    /// Settings of the matte of the captured scene over the garments.
+    pub struct MatteSettings {
+        /// Distance from a patch's edge at which depths are compared, depth pixels: flying pixels lie in between.
+        pub edge_step: f64 = 3.0,
+        /// Colour difference (sum over channels) at which a neighbour's weight is e⁻¹.
+        pub color_scale: f32 = 48.0,
+        /// Radius of the soft edge in depth pixels: the misalignment of depth and colour edges that it must bridge.
+        pub edge_radius: f64 = 3.0,
+        /// Vote share that maps to 0; one minus it maps to 1. Sharpens: half-way votes are edges, not transparent arms.
+        pub certain_share: f32 = 0.25,
+    }
+
+    /// Settings of bare hands and forearms, found by colour.
+    pub struct BareArmSettings {
+        /// Distance from the axis below which skin colour seeds a region, metres.
+        pub seed_distance: f32 = 0.045,
+        /// Share of the forearm next to the elbow that is left to depth: a sleeve may end there.
+        pub elbow: f32 = 0.15,
+        /// Largest depth difference of neighbours on one surface, metres a pixel of depth, on top of the noise.
+        pub step: f32 = 0.015,
+        /// Distance of cloth in front of a hand above which it really is in front (a wide skirt), metres. A shirt that falls
+        /// straight over the waist hangs up to 10 cm in front of a hand on the hip.
+        pub loose: f32 = 0.12,
+        /// Distance behind the tracked trunk above which skin is no hand on it, metres.
+        pub behind: f32 = 0.03,
+        /// Share of a region at the end of the reach above which its colour has leaked into clothes.
+        pub leak: f32 = 0.2,
+        /// Share of the reach beyond which a cell lies at its end.
+        pub end: f32 = 0.88,
+        /// Smallest region, square metres.
+        pub smallest: f32 = 4e-4,
+        /// Largest distance of a forearm's skin from its tracked axis, metres: half its width, and the tracking error.
+        pub forearm_reach: f32 = 0.07,
+        /// Largest distance of a hand's skin from the tracked wrist, metres: a hand's length. The tracked direction of a hand is
+        /// unreliable: half of a real hand on a hip was 8 cm and more off the tracked axis, the wrist 2 cm.
+        pub hand_reach: f32 = 0.21,
+        /// Side of a cell, metres.
+        pub cell: f32 = 0.004,
+        /// Largest depth difference of a captured point on a tracked limb, metres: tracked limbs are right to 3 cm.
+        pub limb_tolerance: f32 = 0.03,
+        /// The same on the trunk, whose clothes hang loosely.
+        pub trunk_tolerance: f32 = 0.06,
+        /// Distance from an arm's axis within which nothing counts as trunk, metres.
+        pub arm_clearance: f32 = 0.09,
+        /// Distance of the four test points from a sampled point, depth pixels: rejects outlines.
+        pub sample_radius: f64 = 2.0,
+        /// Largest distance of a sleeve from the axis, metres.
+        pub sleeve_radius: f32 = 0.10,
+        /// Skin by colour.
+        pub skin: SkinSettings = SkinSettings::default(),
+    }
+
+    /// Settings of skin against clothes by colour.
+    pub struct SkinSettings {
+        /// Least standard deviation of brightness and chroma, grey levels: sensor noise and shading of folds.
+        pub min_sigma: [f32; 3] = [8.0, 2.5, 2.5],
+        /// Logarithm of the density of clothes of an unknown colour, everywhere; larger rejects more skin.
+        pub unknown_clothes: f32 = -18.0,
+        /// Weight of brightness against chroma in clustering: one cloth in light and shade is one or two components.
+        pub brightness: f32 = 0.3,
+        /// Least share of the face or the hands that is like the forearms, which makes them skin: to begin, to go on.
+        pub agree: [f32; 2] = [0.5, 0.4],
+        /// Largest share of the trunk that is like skin (a neckline, an unexpected hand): to begin, to go on.
+        pub mixed: [f32; 2] = [0.08, 0.14],
+    }
+
+    /// Settings of the garments off the recorded person.
+    pub struct OffPersonSettings {
+        /// Distance from the person above which a garment pixel is off it, metres: the cloth of tops hangs closer.
+        pub radius: f32 = 0.04,
+        /// Difference from the garments' depth within which a reading is the person, metres: arms reach that far.
+        pub person_depth: f32 = 0.7,
+        /// Smallest garment that is measured, square metres: less is the end of a sleeve at the picture's edge.
+        pub smallest: f32 = 0.02,
+        /// Cells along the radius, at least, where pixels are that small. An edge is right to half a cell, and without bias.
+        pub cells: f32 = 12.0,
+    }
+
+    /// Settings of the parts of a template.
+    pub struct LimbSettings {
+        /// Half the length of the rings at elbow, wrist and tips, as a share of the forearm.
+        pub ring: f64 = 0.08,
+        /// Height range of the face, as shares of the head's extent upwards from the chin.
+        pub face: [f32; 2] = [0.2, 0.6],
+        /// Front part of the head that is the face, as a share of its depth.
+        pub face_front: f32 = 0.75,
+    }
+}
