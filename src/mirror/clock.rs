@@ -1,7 +1,7 @@
 //! Time step of the cloth from the capture times of frames.
 
 /// Time step where frames give none (s): a camera of 30 frames a second.
-pub(super) const NOMINAL: f64 = 1.0 / 30.0;
+pub const NOMINAL_INTERVAL: f64 = 1.0 / 30.0;
 /// Time steps of the cloth (s). A longer gap is a pause of the camera and no huge step; 0.2 s is a camera of 5 frames a second.
 const STEPS: [f64; 2] = [1.0 / 120.0, 0.2];
 
@@ -10,7 +10,7 @@ pub fn time_step(gap: f64) -> f64 {
     if gap > 0.0 {
         gap.clamp(STEPS[0], STEPS[1])
     } else {
-        NOMINAL
+        NOMINAL_INTERVAL
     }
 }
 
@@ -51,8 +51,8 @@ mod tests {
         ];
         let gaps = times.map(|t| clock.gap(t));
         assert_eq!(gaps, [0.0, 0.04, 0.001, 3.0, 0.0]);
-        let steps = [NOMINAL, 0.04, STEPS[0], STEPS[1], NOMINAL];
+        let steps = [NOMINAL_INTERVAL, 0.04, STEPS[0], STEPS[1], NOMINAL_INTERVAL];
         assert_eq!(gaps.map(time_step), steps);
-        assert_eq!(time_step(f64::NAN), NOMINAL);
+        assert_eq!(time_step(f64::NAN), NOMINAL_INTERVAL);
     }
 }

@@ -1,7 +1,8 @@
 //! An outfit on a body: put on in an easy pose, carried to the pose of the body, then stepped with every posed body.
 
 use super::choice::SizedGarment;
-use super::clock::NOMINAL;
+use super::clock::NOMINAL_INTERVAL;
+use super::settings::OutfitSettings;
 use super::wear_watch::{SETTLING, WearWatch};
 use std::sync::Arc;
 use tryon_body::parts::vertex_masks;
@@ -24,11 +25,6 @@ pub struct Subject<'a> {
     pub world_from_camera: Rigid<World, Camera>,
 }
 
-/// Longer edges of coarse garments: 2.4 times fewer vertices. Longer ones don't resolve sleeves.
-const COARSER: f64 = 1.55;
-
-/// Longest displacement of skin in one step of a carry, metres: 1.5 m/s at [`NOMINAL`] steps, half the speed of fast arms.
-const CARRY_STRIDE: f32 = 0.05;
 /// Most steps of a carry, half a second of cloth: a hand moves by 0.8 m.
 const MOST_CARRY_STEPS: usize = 16;
 
@@ -81,14 +77,15 @@ impl DressedOutfit {
         how: PutOn,
     ) -> Result<Self, DressError> {
         let wear: Vec<GarmentSource<'_>> = worn.iter().map(SizedGarment::wear).collect();
+        let settings = OutfitSettings::default();
         let mut options = DressOptions {
             config: Config::tracked().seen_from(&subject.world_from_camera),
             any_size: how.any_size,
             ..DressOptions::default()
         };
         if how.is_coarse {
-            options.triangulation.edge_length *= COARSER;
-            options.triangulation.hood_length *= COARSER;
+            options.triangulation.edge_length *= settings.coarser;
+            options.triangulation.hood_length *= settings.coarser;
         }
         let Subject { template, rest, .. } = subject;
         let arms = ArmClearance::new(template, rest);
@@ -100,7 +97,7 @@ impl DressedOutfit {
         let dressed = dress_all(template, rest, &easy, &wear, &options)?;
         let masks = vertex_masks(subject.template);
         Ok(Self {
-            wear: WearWatch::new(&dressed.model, &dressed.state, masks),
+            wear: WearWatch::new(&dressed.model, &dressed.state, masks, settings),
             model: Arc::new(dressed.model),
             state: dressed.state,
             work: Workspace::default(),
@@ -130,10 +127,11 @@ impl DressedOutfit {
         let start = self.state.collision_body().vertices().iter();
         let farthest = (start.zip(&body)).map(|(a, b)| (b - a).norm());
         let farthest = farthest.fold(0.0, f32::max);
-        let steps = ((farthest / CARRY_STRIDE).ceil() as usize).clamp(1, MOST_CARRY_STEPS);
+        let steps = ((farthest / self.wear.settings.carry_stride).ceil() as usize)
+            .clamp(1, MOST_CARRY_STEPS);
         for k in 1..=steps {
             place(k as f64 / steps as f64, &mut body);
-            let (body, dt) = (&body[..], NOMINAL);
+            let (body, dt) = (&body[..], NOMINAL_INTERVAL);
             step(
                 &self.model,
                 &mut self.state,

@@ -1,23 +1,16 @@
 //! Fit of a worn outfit from step to step, and its return to how it was put on.
 
+use super::settings::OutfitSettings;
 use tryon_body::parts::BodyPart;
 use tryon_cloth::{ClothError, Model, State, StepReport, WornReference};
 use tryon_geometry::math::P3;
 
-/// Stretch that one edge in a hundred exceeds in a garment that is caught or torn: dances reach 0.25 for a frame.
-const MOST_STRAIN: f64 = 0.25;
-/// Largest median distance of a limb's cloth from where skin would carry it, metres: dances reach 63 mm.
-const MOST_OFFSET: f32 = 0.08;
 /// Steps in a row with a sleeve off after which an outfit is put on again: cloth puts it back in the next one, or never.
 const PATIENCE: u32 = 2;
 /// Steps in which an outfit that was put on again settles: a sleeve that comes off then isn't left to cloth.
 pub(super) const SETTLING: u32 = 4;
 /// Unfit steps of an outfit that doesn't settle after which it must be dressed anew, which takes 0.3 to 0.7 s: one second.
 const MOST_VAIN: u32 = 30;
-/// Mean displacement of a body part that is a jump, metres, and its least speed, m/s: a fast arm moves by 0.2 m in 1/30 s.
-const JUMP: f32 = 0.25;
-/// See [`JUMP`].
-const JUMP_SPEED: f64 = 7.0;
 
 /// Fit of an outfit after one step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -61,6 +54,7 @@ impl WearState {
 /// Watch over an outfit from step to step.
 #[derive(Clone, Debug)]
 pub(super) struct WearWatch {
+    pub(super) settings: OutfitSettings,
     reference: WornReference,
     /// Mask of the part of each body vertex, shape `[body vertices]`.
     masks: Vec<u8>,
@@ -69,8 +63,14 @@ pub(super) struct WearWatch {
 
 impl WearWatch {
     /// Watch over an outfit that has just been put on a body with these part `masks`.
-    pub(super) fn new(model: &Model, state: &State, masks: Vec<u8>) -> Self {
+    pub(super) fn new(
+        model: &Model,
+        state: &State,
+        masks: Vec<u8>,
+        settings: OutfitSettings,
+    ) -> Self {
         Self {
+            settings,
             reference: WornReference::new(model, state),
             masks,
             state: WearState::default(),
@@ -92,7 +92,8 @@ impl WearWatch {
 
     /// True when a part of the body moves from `before` to `now` (metres) in `dt` seconds as no limb can.
     pub(super) fn has_jumped(&self, before: &[P3], now: &[P3], dt: f64) -> bool {
-        let most = JUMP.max((JUMP_SPEED * dt) as f32);
+        let settings = &self.settings;
+        let most = settings.jump.max((settings.jump_speed * dt) as f32);
         let moved = |part: BodyPart| {
             let vertices = self.masks.iter().zip(before).zip(now);
             let of = vertices.filter(|((mask, _), _)| **mask == part.mask());
@@ -111,8 +112,9 @@ impl WearWatch {
         report: &StepReport,
         jumped: bool,
     ) {
-        let is_torn = report.p99_strain > MOST_STRAIN
-            || self.reference.limb_offset(model, state) > MOST_OFFSET;
+        let settings = &self.settings;
+        let is_torn = report.p99_strain > settings.most_strain
+            || self.reference.limb_offset(model, state) > settings.most_offset;
         let fit = match WornReference::lost_sleeve_rings(model, state) {
             _ if is_torn => Fit::Torn,
             0 => Fit::Worn,
