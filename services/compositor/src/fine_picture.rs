@@ -7,28 +7,27 @@ use crate::formats::Format;
 use crate::join_buffer::JoinBuffer;
 use crate::off_person;
 use crate::try_on::{Command, Handle};
-use crate::upstream;
+use crate::upstream::MAX_GARMENT_BYTES;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 use tokio::sync::{OwnedSemaphorePermit, mpsc, oneshot, watch};
 use tonic::{Code, Request, Status};
+use tryon::geometry::math::P3;
 use tryon_kit::auth::Connection;
-use tryon_kit::client::{pauses, request};
 use tryon_kit::compute::Pool;
 use tryon_kit::frames::stage;
 use tryon_kit::sessions::{brief, unix_ns};
+use tryon_kit::simulations::{FineFrame, FollowError, FrameOrder, LossPolicy, SimulationClient};
 use tryon_kit::status::{from_upstream, not_found, unavailable};
 use tryon_proto::convert::WireError;
 use tryon_proto::convert::geometry::rigid_from_wire;
 use tryon_proto::convert::required;
-use tryon_proto::convert::simulation::{self, garments_from_wire, positions_from_wire};
-use tryon_proto::v1::cloth_service_client::ClothServiceClient;
+use tryon_proto::convert::simulation::{self, garments_from_wire};
 use tryon_proto::v1::start_simulation_request::Start;
 use tryon_proto::v1::take_fine_picture_response::Content;
 use tryon_proto::v1::{
-    CancelSimulationRequest, ClothDetail, DrapeStep, FollowSimulationRequest,
-    FollowSimulationResponse, FrameId, Picture, PictureCodec, SessionStart, StartSimulationRequest,
-    StartSimulationResponse, TakeFinePictureResponse, TryOnState,
+    ClothDetail, DrapeStep, FollowSimulationResponse, FrameId, Picture, PictureCodec, SessionStart,
+    StartSimulationRequest, StartSimulationResponse, TakeFinePictureResponse, TryOnState,
 };
 
 /// Vertices of all garments without a wish.
@@ -85,20 +84,15 @@ pub(crate) fn vertices(wanted: u32) -> Result<u32, WireError> {
 
 /// Simulation in cloth. Dropping it ends it; one that has ended stays as it is.
 struct Simulation {
-    client: ClothServiceClient<Connection>,
+    client: SimulationClient,
     id: String,
 }
 
 impl Drop for Simulation {
     fn drop(&mut self) {
-        let mut client = self.client.clone();
-        let simulation_id = std::mem::take(&mut self.id);
-        tokio::spawn(async move {
-            // It ends by itself at the latest, and its frames are forgotten with the body.
-            let _ = client
-                .cancel_simulation(request(CancelSimulationRequest { simulation_id }))
-                .await;
-        });
+        let client = self.client.clone();
+        let id = std::mem::take(&mut self.id);
+        tokio::spawn(async move { client.abandon(&id).await });
     }
 }
 
@@ -156,23 +150,26 @@ impl FinePicture {
 
     async fn one_pose(&self, steps: &Steps) -> Result<Picture, Failure> {
         let begun = Instant::now();
-        let mut client = upstream::client(self.cloth.clone());
+        let policy = LossPolicy {
+            tries: LOST_LINES,
+            is_lost: |why| matches!(end(why), Failure::Line(_)),
+            cut: Some("the drape ended without a frame"),
+        };
+        let client = SimulationClient::new(self.cloth.clone(), MAX_GARMENT_BYTES, policy);
         let before = self.recent().await?;
         // The exposure of the start is kept now: it is half a second old when the meshes are divided.
-        let (started, after) = tokio::join!(client.start_simulation(self.start()), async {
+        let (started, after) = tokio::join!(client.start(self.start()), async {
             tokio::time::sleep(ARRIVAL).await;
             self.recent().await
         });
-        let started = started.map_err(|s| refusal(&s))?.into_inner();
-        let simulation = Simulation {
-            client: client.clone(),
-            id: started.simulation_id.clone(),
-        };
+        let started = started.map_err(|s| refusal(&s))?;
+        let id = started.simulation_id.clone();
+        let simulation = Simulation { client, id };
         let id = required(started.exposure, "start_simulation_response.exposure")?;
         let mut job = exposed(&id, &[after?, before])?;
-        let frame = drape(&simulation, steps).await?;
+        let positions = drape(&simulation, &started, steps).await?;
         drop(simulation);
-        job.placed = Some(Arc::new(placed(&started, &frame, begun)?));
+        job.placed = Some(Arc::new(placed(&started, &positions, begun)?));
         job.formats = vec![Format {
             size: None,
             encoding: self.encoding,
@@ -252,69 +249,44 @@ fn exposed(id: &FrameId, recent: &[JoinBuffer]) -> Result<Job, Status> {
     })
 }
 
-/// Follows a drape to its frame, also over a line that breaks.
+/// Vertices of a drape at rest (m, world), followed also over a line that breaks.
 async fn drape(
     simulation: &Simulation,
+    started: &StartSimulationResponse,
     steps: &Steps,
-) -> Result<FollowSimulationResponse, Failure> {
-    let mut client = simulation.client.clone();
-    let mut lost = pauses().take(LOST_LINES);
-    loop {
-        let mut has_heard = false;
-        let why = match one_stream(&mut client, &simulation.id, steps, &mut has_heard).await {
-            Ok(Some(frame)) => return Ok(frame),
-            Ok(None) => Status::unavailable("the drape ended without a frame"),
-            Err(s) => s,
-        };
-        if has_heard {
-            lost = pauses().take(LOST_LINES);
+) -> Result<Vec<P3>, Failure> {
+    let mut order = FrameOrder::new(started.vertex_count as usize, 0);
+    order.expect(1);
+    let mut draped = Vec::new();
+    let receive = |m: &FollowSimulationResponse, frame: Option<FineFrame>| {
+        match frame {
+            Some(frame) => draped = frame.positions,
+            None => m.drape.into_iter().for_each(|step| {
+                steps.send_replace(step);
+            }),
         }
-        match end(&why) {
-            Failure::Line(_) => {}
-            over => return Err(over),
-        }
-        let Some(pause) = lost.next() else {
-            return Err(end(&why));
-        };
-        tokio::time::sleep(pause).await;
-    }
-}
-
-/// Follows a drape until it or the line ends; `None` when it ended without a frame.
-async fn one_stream(
-    client: &mut ClothServiceClient<Connection>,
-    simulation: &str,
-    steps: &Steps,
-    has_heard: &mut bool,
-) -> Result<Option<FollowSimulationResponse>, Status> {
-    let follow = FollowSimulationRequest {
-        simulation_id: simulation.into(),
-        first_frame: 0,
+        Ok(())
     };
-    let mut frames = client.follow_simulation(follow).await?.into_inner();
-    while let Some(m) = frames.message().await? {
-        *has_heard = true;
-        if !m.positions.is_empty() {
-            return Ok(Some(m));
-        }
-        if let Some(step) = m.drape {
-            steps.send_replace(step);
-        }
+    let followed = simulation
+        .client
+        .follow(&simulation.id, &mut order, receive);
+    match followed.await {
+        Ok(()) => Ok(draped),
+        Err(FollowError::Service(why)) => Err(end(&why)),
+        Err(FollowError::Receiver(why)) => Err(why),
     }
-    Ok(None)
 }
 
 fn placed(
     started: &StartSimulationResponse,
-    frame: &FollowSimulationResponse,
+    positions: &[P3],
     begun: Instant,
 ) -> Result<Placed, WireError> {
     let field = "start_simulation_response.world_from_camera";
     let world = required(started.world_from_camera.as_ref(), field)?;
     let garments = garments_from_wire(started)?;
-    let positions = positions_from_wire(frame, started.vertex_count as usize)?;
     Ok(Placed {
-        garments: simulation::placed(garments, &positions.unwrap_or_default())?,
+        garments: simulation::placed(garments, positions)?,
         world_from_camera: rigid_from_wire(world, field)?,
         stages: vec![stage("cloth.drape", begun)],
         revision: 0,

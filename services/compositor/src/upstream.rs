@@ -21,7 +21,7 @@ use tryon_proto::v1::{
 };
 
 /// Largest garment message, bytes. Outfits of the library take a few hundred kB.
-const MAX_GARMENT_BYTES: usize = 16 * 1024 * 1024;
+pub(crate) const MAX_GARMENT_BYTES: usize = 16 * 1024 * 1024;
 
 /// Longest pause between attempts: cloth is to be followed as soon as it answers again.
 const LONGEST_PAUSE: Duration = Duration::from_millis(200);

@@ -23,6 +23,7 @@
 //! - No core dumps: [`mod@core_dump`].
 //! - Computation off async workers: [`mod@compute`].
 //! - A body that outlives restarts: [`mod@remembered_body`].
+//! - Simulations of a cloth service, followed: [`mod@simulations`].
 //! - Sealed frames: [`mod@seal`].
 //! - Zeroed memory: [`mod@forget`].
 #![allow(rustdoc::private_intra_doc_links)] // the index of ideas names private modules
@@ -60,6 +61,7 @@ pub mod seal;
 pub mod server;
 pub mod session_task;
 pub mod sessions;
+pub mod simulations;
 pub mod status;
 pub mod supervisor;
 pub mod telemetry;

@@ -1,6 +1,5 @@
 //! Files of a simulation, valid after every frame: positions.npy and report.json, and outfit.glb at the end.
 
-use super::order::FineFrame;
 use super::outfit::write_outfit;
 use super::report::{FineReport, parts};
 use crate::input;
@@ -8,6 +7,7 @@ use crate::offline_files::replace;
 use anyhow::{Context, Result, ensure};
 use std::path::{Path, PathBuf};
 use tryon::formats::NpyFrames;
+use tryon_kit::simulations::FineFrame;
 use tryon_proto::convert::garment::WornGarment;
 
 /// Positions and report of the frames so far.
@@ -113,11 +113,10 @@ impl FineFiles {
 
 #[cfg(test)]
 mod tests {
-    use super::super::order::FrameOrder;
-    use super::super::order::tests::message;
     use super::*;
     use tryon::formats::npy::read_npy;
-    use tryon_proto::v1::{GarmentLook, StartSimulationResponse};
+    use tryon::geometry::math::P3;
+    use tryon_proto::v1::{FrameId, GarmentLook, StartSimulationResponse};
 
     fn dot(name: &str) -> WornGarment {
         WornGarment {
@@ -144,10 +143,13 @@ mod tests {
         assert!(FineFiles::open(out, "one").is_err(), "no files");
         let report = FineReport::new(&started, &garments).expect("valid");
         let mut files = FineFiles::create(out, report).expect("created");
-        let mut order = FrameOrder::new(1, 0);
-        let mut frame = |n: u32| order.take(&message(n, n as f32)).expect("valid");
+        let frame = |n: u8| FineFrame {
+            positions: vec![P3::new(f32::from(n), 0.0, 0.0)],
+            exposure: FrameId::default(),
+            ms: 5.0,
+        };
         for n in [0, 1] {
-            files.push(&frame(n).expect("a frame")).expect("written");
+            files.push(&frame(n)).expect("written");
         }
 
         let other = FineFiles::open(out, "two").expect_err("another");
@@ -161,7 +163,7 @@ mod tests {
                 .contains("other garments")
         );
         let mut files = open().continued("two", &garments).expect("written");
-        files.push(&frame(2).expect("a frame")).expect("written");
+        files.push(&frame(2)).expect("written");
         assert_eq!((files.len(), files.vertices()), (3, 1));
         let (shape, values) = read_npy(&out.join("positions.npy")).expect("read");
         assert_eq!((shape, values[6]), (vec![3, 1, 3], 2.0));

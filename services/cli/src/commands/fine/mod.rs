@@ -1,8 +1,6 @@
 //! `tryon fine`: a live session's garments on finer meshes, simulated by a running cloth service.
 
 mod files;
-mod intake;
-mod order;
 mod outfit;
 mod progress;
 mod report;
@@ -14,12 +12,13 @@ use crate::interrupt::{INTERRUPTED, Interrupt};
 use crate::say::say;
 use anyhow::{Context, Result, ensure};
 use files::FineFiles;
-use intake::Intake;
+use progress::FineProgress;
 use report::FineReport;
-use service::SimulationClient;
+use service::FineService;
 use std::borrow::Cow;
 use std::process::ExitCode;
 use tryon_kit::config::Config;
+use tryon_kit::simulations::FrameOrder;
 use tryon_proto::convert::simulation::garments_from_wire;
 use tryon_proto::v1::start_simulation_request::Start;
 use tryon_proto::v1::{SessionStart, StartSimulationRequest, StartSimulationResponse};
@@ -46,7 +45,7 @@ async fn simulate(
     config: &Config,
     interrupt: &Interrupt,
 ) -> Result<ExitCode> {
-    let service = SimulationClient::connect(config)?;
+    let service = FineService::connect(config)?;
     let earlier = args.simulation.as_deref();
     // Read before the start: a simulation continues once.
     let earlier = earlier.map(|id| FineFiles::open(&args.out, id).map(|files| (id, files)));
@@ -105,7 +104,7 @@ struct Received {
 /// The frames before an error are in the files too.
 async fn receive(
     args: &FineSessionArgs,
-    service: &SimulationClient,
+    service: &FineService,
     started: &StartSimulationResponse,
     earlier: Option<(&str, FineFiles)>,
     interrupt: &Interrupt,
@@ -121,45 +120,45 @@ async fn receive(
             (None, FineFiles::create(&args.out, report)?)
         }
     };
-    let mut intake = Intake::new(&mut files);
-    let followed = follow(service, started, cancelled, &mut intake);
+    let mut order = FrameOrder::new(files.vertices(), files.len() as u32);
+    let followed = follow(service, started, cancelled, &mut order, &mut files);
     let followed = or_cancel(service, &started.simulation_id, followed, interrupt).await;
-    let is_whole = intake.order().is_whole();
-    drop(intake);
 
     let finished = files.finish(&garments);
     followed?;
     finished?;
     Ok(Received {
         frames: files.len(),
-        is_whole,
+        is_whole: order.is_whole(),
     })
 }
 
 /// Follows a simulation, after the frames of the cancelled one before it that are missing.
 async fn follow(
-    service: &SimulationClient,
+    service: &FineService,
     started: &StartSimulationResponse,
     cancelled: Option<&str>,
-    intake: &mut Intake<'_>,
+    order: &mut FrameOrder,
+    files: &mut FineFiles,
 ) -> Result<()> {
+    let mut progress = FineProgress::new();
     let first = started.first_frame;
-    let before = cancelled.filter(|_| intake.order().next() < first);
-    if let Some(id) = before {
-        service.follow(id, intake).await?;
+    if let Some(id) = cancelled.filter(|_| order.next() < first) {
+        service.follow(id, order, files, &mut progress).await?;
     }
-    let next = intake.order().next();
+    let next = order.next();
     ensure!(
         next == first,
         "it goes on with frame {first}, but {next} frames came before"
     );
-    intake.order().expect(started.frame_count);
-    service.follow(&started.simulation_id, intake).await
+    order.expect(started.frame_count);
+    let id = &started.simulation_id;
+    service.follow(id, order, files, &mut progress).await
 }
 
 /// Waits for the end of `followed`; after Ctrl-C cancels the simulation, which ends it.
 async fn or_cancel(
-    service: &SimulationClient,
+    service: &FineService,
     id: &str,
     followed: impl Future<Output = Result<()>>,
     interrupt: &Interrupt,

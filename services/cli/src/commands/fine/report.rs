@@ -1,16 +1,14 @@
 //! report.json of a simulation, from which a later run continues it.
 
-use super::order::FineFrame;
 use crate::report::{GarmentPart, garment_parts};
 use serde::{Deserialize, Serialize};
 use tryon::geometry::math::{Camera, Rigid, World};
+use tryon::mirror::NOMINAL_INTERVAL;
+use tryon_kit::simulations::FineFrame;
 use tryon_proto::convert::WireError;
 use tryon_proto::convert::garment::WornGarment;
 use tryon_proto::convert::geometry::rigid_from_wire;
 use tryon_proto::v1::StartSimulationResponse;
-
-/// Time between frames where the exposures have none (s).
-const INTERVAL: f32 = 1.0 / 30.0;
 
 /// A simulation and its frames so far.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -82,7 +80,7 @@ impl FineReport {
         });
         let gaps = self.frames.len().saturating_sub(1);
         if span == 0 || gaps == 0 {
-            return INTERVAL;
+            return NOMINAL_INTERVAL as f32;
         }
         (span as f64 * 1e-9 / gaps as f64) as f32
     }
@@ -95,19 +93,27 @@ pub(super) fn parts(garments: &[WornGarment]) -> Vec<GarmentPart> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::order::FrameOrder;
-    use super::super::order::tests::message;
     use super::super::outfit::tests::garment;
     use super::*;
+    use tryon_proto::v1::FrameId;
 
     #[test]
     fn frames_are_as_far_apart_as_their_exposures_in_the_mean() {
         let started = StartSimulationResponse::default();
         let mut report = FineReport::new(&started, &[garment("top")]).expect("valid");
-        assert_eq!((report.interval(), report.vertices()), (INTERVAL, 3));
-        for (next, interval) in [(0, INTERVAL), (1, 0.1), (5, 0.25)] {
-            let frame = FrameOrder::new(1, next).take(&message(next, 0.0));
-            report.push(&frame.expect("valid").expect("a frame"));
+        assert_eq!(
+            (report.interval(), report.vertices()),
+            (NOMINAL_INTERVAL as f32, 3)
+        );
+        for (next, interval) in [(0, NOMINAL_INTERVAL as f32), (1, 0.1), (5, 0.25)] {
+            report.push(&FineFrame {
+                positions: Vec::new(),
+                exposure: FrameId {
+                    capture_time_ns: 100_000_000 * next,
+                    ..FrameId::default()
+                },
+                ms: 5.0,
+            });
             assert!((report.interval() - interval).abs() < 1e-6);
         }
     }

@@ -7,18 +7,18 @@ use tryon_proto::v1::{FollowSimulationResponse, FrameId};
 
 /// A finished frame of a simulation.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct FineFrame {
+pub struct FineFrame {
     /// Vertices of all garments (m, world).
-    pub(super) positions: Vec<P3>,
+    pub positions: Vec<P3>,
     /// The exposure whose body the frame follows.
-    pub(super) exposure: FrameId,
+    pub exposure: FrameId,
     /// Computing time in the service (ms).
-    pub(super) ms: f32,
+    pub ms: f32,
 }
 
 /// Frames that have arrived, and that are still to come.
 #[derive(Debug, Clone)]
-pub(super) struct FrameOrder {
+pub struct FrameOrder {
     vertices: usize,
     next: u32,
     count: u32,
@@ -26,7 +26,7 @@ pub(super) struct FrameOrder {
 
 impl FrameOrder {
     /// Frames from `next` on, of so many vertices; their number is not known.
-    pub(super) fn new(vertices: usize, next: u32) -> Self {
+    pub fn new(vertices: usize, next: u32) -> Self {
         let count = 0;
         Self {
             vertices,
@@ -39,7 +39,7 @@ impl FrameOrder {
     ///
     /// # Errors
     /// Names the field of the message at fault, `frame` for one that is not the next.
-    pub(super) fn take(
+    pub fn take(
         &mut self,
         message: &FollowSimulationResponse,
     ) -> Result<Option<FineFrame>, WireError> {
@@ -69,34 +69,34 @@ impl FrameOrder {
     }
 
     /// Number of frames of the simulation; 0 changes nothing.
-    pub(super) fn expect(&mut self, count: u32) {
+    pub fn expect(&mut self, count: u32) {
         if count > 0 {
             self.count = count;
         }
     }
 
     /// The first frame that is missing.
-    pub(super) fn next(&self) -> u32 {
+    pub fn next(&self) -> u32 {
         self.next
     }
 
     /// Number of frames of the simulation; 0 while the body is being recorded.
-    pub(super) fn count(&self) -> u32 {
+    pub fn count(&self) -> u32 {
         self.count
     }
 
     /// True once the last frame has arrived.
-    pub(super) fn is_whole(&self) -> bool {
+    pub fn is_whole(&self) -> bool {
         self.count > 0 && self.next >= self.count
     }
 }
 
 #[cfg(test)]
-pub(super) mod tests {
+mod tests {
     use super::*;
 
     /// Message of a frame of one vertex at (`x`, 0, 0), exposed after `frame` tenths of a second.
-    pub(in super::super) fn message(frame: u32, x: f32) -> FollowSimulationResponse {
+    fn message(frame: u32, x: f32) -> FollowSimulationResponse {
         let positions: Vec<u8> = [x, 0.0, 0.0]
             .into_iter()
             .flat_map(f32::to_le_bytes)
