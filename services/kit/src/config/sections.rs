@@ -4,6 +4,7 @@ use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::net::{IpAddr, Ipv4Addr, SocketAddr};
 use std::path::{Path, PathBuf};
+use tryon::geometry::settings;
 
 const fn local(port: u16) -> SocketAddr {
     SocketAddr::new(IpAddr::V4(Ipv4Addr::LOCALHOST), port)
@@ -20,14 +21,15 @@ pub enum LogFormat {
     Json,
 }
 
-/// Logs.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct LogConfig {
-    /// pretty or json.
-    pub format: LogFormat,
-    /// Filter: a level, `module=level` pairs, or both, between commas.
-    pub level: String,
+settings! {
+    owned:
+    /// Logs.
+    pub struct LogConfig {
+        /// pretty or json.
+        pub format: LogFormat = LogFormat::Pretty,
+        /// Filter: a level, `module=level` pairs, or both, between commas.
+        pub level: String = "info,zenoh=error".into(),
+    }
 }
 
 impl LogConfig {
@@ -53,23 +55,15 @@ impl LogConfig {
     }
 }
 
-impl Default for LogConfig {
-    fn default() -> Self {
-        Self {
-            format: LogFormat::Pretty,
-            level: "info,zenoh=error".into(),
-        }
+settings! {
+    owned:
+    /// Traces.
+    pub struct TelemetryConfig {
+        /// OTLP/gRPC endpoint of a collector, such as `http://127.0.0.1:4317`; empty: no traces.
+        pub otlp: String = String::new(),
+        /// Exposures of each camera that are traced a second.
+        pub traces_per_second: f64 = 1.0,
     }
-}
-
-/// Traces.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct TelemetryConfig {
-    /// OTLP/gRPC endpoint of a collector, such as `http://127.0.0.1:4317`; empty: no traces.
-    pub otlp: String,
-    /// Exposures of each camera that are traced a second.
-    pub traces_per_second: f64,
 }
 
 impl TelemetryConfig {
@@ -84,57 +78,26 @@ impl TelemetryConfig {
     }
 }
 
-impl Default for TelemetryConfig {
-    fn default() -> Self {
-        Self {
-            otlp: String::new(),
-            traces_per_second: 1.0,
-        }
+settings! {
+    owned:
+    /// Threads and shutdown.
+    pub struct ProcessConfig {
+        /// Threads for computing; 0 means one for each core.
+        pub compute_threads: usize = 0,
+        /// Time that open streams have to finish after a signal (ms); then they are cut.
+        pub grace_ms: u64 = 3000,
+        /// Lets addresses beyond loopback be bound, where anybody who reaches them sees the person.
+        pub insecure: bool = false,
     }
-}
 
-/// Threads and shutdown.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct ProcessConfig {
-    /// Threads for computing; 0 means one for each core.
-    pub compute_threads: usize,
-    /// Time that open streams have to finish after a signal (ms); then they are cut.
-    pub grace_ms: u64,
-    /// Lets addresses beyond loopback be bound, where anybody who reaches them sees the person.
-    pub insecure: bool,
-}
-
-impl Default for ProcessConfig {
-    fn default() -> Self {
-        Self {
-            compute_threads: 0,
-            grace_ms: 3000,
-            insecure: false,
-        }
-    }
-}
-
-/// Frames between processes.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct BusConfig {
-    /// File of zenoh (JSON5) with certificates and access control, as `deploy/zenoh/secure/service.json5`; empty for none.
-    pub config: PathBuf,
-    /// Endpoints on which the capture process listens: `tcp/ADDRESS:PORT`, `tls/HOST:PORT` or `unixsock-stream/PATH`.
-    pub listen: Vec<String>,
-    /// Endpoints to which the other processes connect.
-    pub connect: Vec<String>,
-}
-
-impl Default for BusConfig {
-    fn default() -> Self {
-        let endpoint = vec!["tcp/127.0.0.1:7447".to_owned()];
-        Self {
-            config: PathBuf::new(),
-            listen: endpoint.clone(),
-            connect: endpoint,
-        }
+    /// Frames between processes.
+    pub struct BusConfig {
+        /// File of zenoh (JSON5) with certificates and access control, as `deploy/zenoh/secure/service.json5`; empty for none.
+        pub config: PathBuf = PathBuf::new(),
+        /// Endpoints on which the capture process listens: `tcp/ADDRESS:PORT`, `tls/HOST:PORT` or `unixsock-stream/PATH`.
+        pub listen: Vec<String> = vec!["tcp/127.0.0.1:7447".to_owned()],
+        /// Endpoints to which the other processes connect.
+        pub connect: Vec<String> = vec!["tcp/127.0.0.1:7447".to_owned()],
     }
 }
 
@@ -210,185 +173,123 @@ impl TlsConfig {
     }
 }
 
-/// The capture service.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct CaptureConfig {
-    /// gRPC address.
-    pub address: SocketAddr,
-    /// Metrics and probes; port 0 in tests.
-    pub admin: SocketAddr,
-    /// Store part of the bus keys.
-    pub store: String,
-    /// Folder for recordings; empty means that nothing can be recorded.
-    pub recordings: PathBuf,
-    /// The cameras.
-    pub cameras: Vec<CameraConfig>,
-}
-
-impl Default for CaptureConfig {
-    fn default() -> Self {
-        Self {
-            address: local(7451),
-            admin: local(9101),
-            store: "store".into(),
-            recordings: PathBuf::new(),
-            cameras: vec![CameraConfig::default()],
-        }
+settings! {
+    owned:
+    /// The capture service.
+    pub struct CaptureConfig {
+        /// gRPC address.
+        pub address: SocketAddr = local(7451),
+        /// Metrics and probes; port 0 in tests.
+        pub admin: SocketAddr = local(9101),
+        /// Store part of the bus keys.
+        pub store: String = "store".into(),
+        /// Folder for recordings; empty means that nothing can be recorded.
+        pub recordings: PathBuf = PathBuf::new(),
+        /// The cameras.
+        pub cameras: Vec<CameraConfig> = vec![CameraConfig::default()],
     }
-}
 
-/// One camera.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct CameraConfig {
-    /// Camera part of the bus keys.
-    pub name: String,
-    /// `synth`, `synth:CLIP`, `pattern` (a test picture), or the path of a recording: an RGBD folder or an .mcap file.
-    pub source: String,
-    /// Frames a second; 0 means the source's own rate.
-    pub rate: f64,
-    /// Ignore all rates and go as fast as possible.
-    pub fast: bool,
-    /// Start again at the end of a recording.
-    #[serde(rename = "loop")]
-    pub looped: bool,
-    /// Start publishing with the process.
-    pub autostart: bool,
-}
-
-impl Default for CameraConfig {
-    fn default() -> Self {
-        Self {
-            name: "front".into(),
-            source: "synth".into(),
-            rate: 0.0,
-            fast: false,
-            looped: true,
-            autostart: true,
-        }
+    /// One camera.
+    pub struct CameraConfig {
+        /// Camera part of the bus keys.
+        pub name: String = "front".into(),
+        /// `synth`, `synth:CLIP`, `pattern` (a test picture), or the path of a recording: an RGBD folder or an .mcap file.
+        pub source: String = "synth".into(),
+        /// Frames a second; 0 means the source's own rate.
+        pub rate: f64 = 0.0,
+        /// Ignore all rates and go as fast as possible.
+        pub fast: bool = false,
+        /// Start again at the end of a recording.
+        #[serde(rename = "loop")]
+        pub looped: bool = true,
+        /// Start publishing with the process.
+        pub autostart: bool = true,
     }
-}
 
-/// The tracking service.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct TrackingConfig {
-    /// gRPC address.
-    pub address: SocketAddr,
-    /// Metrics and probes.
-    pub admin: SocketAddr,
-    /// SMPL-layout npz to use as template; empty means the embedded body.
-    pub body: PathBuf,
-    /// Most sessions at a time.
-    pub max_sessions: usize,
-    /// Seconds after which a session that nobody reads is closed.
-    pub idle_s: u64,
-}
-
-impl Default for TrackingConfig {
-    fn default() -> Self {
-        Self {
-            address: local(7452),
-            admin: local(9102),
-            body: PathBuf::new(),
-            max_sessions: 4,
-            idle_s: 30,
-        }
-    }
-}
-
-/// The cloth service.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct ClothConfig {
-    /// gRPC address.
-    pub address: SocketAddr,
-    /// Metrics and probes.
-    pub admin: SocketAddr,
-    /// The tracking service to follow.
-    pub tracking: String,
-    /// Most sessions at a time.
-    pub max_sessions: usize,
-    /// Seconds after which a session that nobody streams is closed.
-    pub idle_s: u64,
-    /// Gives up detail of cloth while exposures go without garments.
-    pub adapts_detail: bool,
-    /// Most simulations at a time.
-    pub max_simulations: usize,
-    /// Folder of mesh garments (`.obj`, `.glb`, `.gltf`, `.mhclo`) and captures (folders that `tryon clothcap capture`
-    /// wrote), with one level of folders in it; empty for none. Meshes are offered under their files' names beside the
-    /// library, garments of a capture as `FOLDER_top`, `FOLDER_under`, `FOLDER_bottom` … A fault is logged, and its file or
-    /// capture left out.
-    pub garments: PathBuf,
-    /// Body that the mesh garments of the folder were made on (`.obj` or SMPL-layout `.npz`): they come in sizes then.
-    /// Empty: a guess for each, and one size made to measure. A capture has its own.
-    pub garments_body: PathBuf,
-    /// Material of the garments of the folder: `cotton` or another preset.
-    pub garments_material: String,
-    /// Other materials for garments of the folder, by the name they are offered under.
-    pub garment_materials: BTreeMap<String, String>,
-}
-
-impl Default for ClothConfig {
-    fn default() -> Self {
-        Self {
-            address: local(7453),
-            admin: local(9103),
-            tracking: "http://127.0.0.1:7452".into(),
-            max_sessions: 4,
-            idle_s: 30,
-            adapts_detail: true,
-            max_simulations: 1,
-            garments: PathBuf::new(),
-            garments_body: PathBuf::new(),
-            garments_material: "cotton".into(),
-            garment_materials: BTreeMap::new(),
-        }
-    }
-}
-
-/// The compositor.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct CompositorConfig {
-    /// gRPC, gRPC-web and page address.
-    pub address: SocketAddr,
-    /// Metrics and probes.
-    pub admin: SocketAddr,
     /// The tracking service.
-    pub tracking: String,
+    pub struct TrackingConfig {
+        /// gRPC address.
+        pub address: SocketAddr = local(7452),
+        /// Metrics and probes.
+        pub admin: SocketAddr = local(9102),
+        /// SMPL-layout npz to use as template; empty means the embedded body.
+        pub body: PathBuf = PathBuf::new(),
+        /// Most sessions at a time.
+        pub max_sessions: usize = 4,
+        /// Seconds after which a session that nobody reads is closed.
+        pub idle_s: u64 = 30,
+    }
+
     /// The cloth service.
-    pub cloth: String,
-    /// The capture service, which asks for consent.
-    pub capture: String,
-    /// Camera of a try-on that names none.
-    pub store: String,
-    /// Camera of a try-on that names none.
-    pub camera: String,
-    /// Most try-ons at a time.
-    pub max_try_ons: usize,
-    /// Refuses try-ons beside others that this machine has no processors for.
-    pub by_capacity: bool,
-    /// Most viewers of a try-on.
-    pub max_viewers: usize,
-    /// Most sizes and qualities of a try-on's pictures; viewers of one share its pictures.
-    pub max_formats: usize,
-    /// Seconds after which a try-on that nobody streams is closed.
-    pub idle_s: u64,
-    /// Milliseconds without a frame after which the camera counts as silent.
-    pub camera_silence_ms: u64,
-    /// Milliseconds after which garments are too old to be shown.
-    pub garments_late_ms: u64,
-    /// Names of this port beside its IP addresses and localhost; requests to others are refused.
-    pub hosts: Vec<String>,
-    /// Origins of foreign pages that may call it, such as `https://kiosk.example`.
-    pub origins: Vec<String>,
-    /// Origin under which a shopper's phone reaches this port, such as `https://mirror.example`: the beginning of photo
-    /// links. Empty: the host that the page was asked for by.
-    pub public: String,
-    /// auto, cpu or gpu.
-    pub renderer: RendererChoice,
+    pub struct ClothConfig {
+        /// gRPC address.
+        pub address: SocketAddr = local(7453),
+        /// Metrics and probes.
+        pub admin: SocketAddr = local(9103),
+        /// The tracking service to follow.
+        pub tracking: String = "http://127.0.0.1:7452".into(),
+        /// Most sessions at a time.
+        pub max_sessions: usize = 4,
+        /// Seconds after which a session that nobody streams is closed.
+        pub idle_s: u64 = 30,
+        /// Gives up detail of cloth while exposures go without garments.
+        pub adapts_detail: bool = true,
+        /// Most simulations at a time.
+        pub max_simulations: usize = 1,
+        /// Folder of mesh garments (`.obj`, `.glb`, `.gltf`, `.mhclo`) and captures (folders that `tryon clothcap capture`
+        /// wrote), with one level of folders in it; empty for none. Meshes are offered under their files' names beside the
+        /// library, garments of a capture as `FOLDER_top`, `FOLDER_under`, `FOLDER_bottom` … A fault is logged, and its file or
+        /// capture left out.
+        pub garments: PathBuf = PathBuf::new(),
+        /// Body that the mesh garments of the folder were made on (`.obj` or SMPL-layout `.npz`): they come in sizes then.
+        /// Empty: a guess for each, and one size made to measure. A capture has its own.
+        pub garments_body: PathBuf = PathBuf::new(),
+        /// Material of the garments of the folder: `cotton` or another preset.
+        pub garments_material: String = "cotton".into(),
+        /// Other materials for garments of the folder, by the name they are offered under.
+        pub garment_materials: BTreeMap<String, String> = BTreeMap::new(),
+    }
+
+    /// The compositor.
+    pub struct CompositorConfig {
+        /// gRPC, gRPC-web and page address.
+        pub address: SocketAddr = local(8080),
+        /// Metrics and probes.
+        pub admin: SocketAddr = local(9104),
+        /// The tracking service.
+        pub tracking: String = "http://127.0.0.1:7452".into(),
+        /// The cloth service.
+        pub cloth: String = "http://127.0.0.1:7453".into(),
+        /// The capture service, which asks for consent.
+        pub capture: String = "http://127.0.0.1:7451".into(),
+        /// Camera of a try-on that names none.
+        pub store: String = "store".into(),
+        /// Camera of a try-on that names none.
+        pub camera: String = "front".into(),
+        /// Most try-ons at a time.
+        pub max_try_ons: usize = 4,
+        /// Refuses try-ons beside others that this machine has no processors for.
+        pub by_capacity: bool = true,
+        /// Most viewers of a try-on.
+        pub max_viewers: usize = 64,
+        /// Most sizes and qualities of a try-on's pictures; viewers of one share its pictures.
+        pub max_formats: usize = 8,
+        /// Seconds after which a try-on that nobody streams is closed.
+        pub idle_s: u64 = 30,
+        /// Milliseconds without a frame after which the camera counts as silent.
+        pub camera_silence_ms: u64 = 700,
+        /// Milliseconds after which garments are too old to be shown.
+        pub garments_late_ms: u64 = 700,
+        /// Names of this port beside its IP addresses and localhost; requests to others are refused.
+        pub hosts: Vec<String> = Vec::new(),
+        /// Origins of foreign pages that may call it, such as `https://kiosk.example`.
+        pub origins: Vec<String> = Vec::new(),
+        /// Origin under which a shopper's phone reaches this port, such as `https://mirror.example`: the beginning of photo
+        /// links. Empty: the host that the page was asked for by.
+        pub public: String = String::new(),
+        /// auto, cpu or gpu.
+        pub renderer: RendererChoice = RendererChoice::Auto,
+    }
 }
 
 /// Renderer of the pictures.
@@ -402,29 +303,4 @@ pub enum RendererChoice {
     Cpu,
     /// Any adapter, software included; without one the start fails.
     Gpu,
-}
-
-impl Default for CompositorConfig {
-    fn default() -> Self {
-        Self {
-            address: local(8080),
-            admin: local(9104),
-            tracking: "http://127.0.0.1:7452".into(),
-            cloth: "http://127.0.0.1:7453".into(),
-            capture: "http://127.0.0.1:7451".into(),
-            store: "store".into(),
-            camera: "front".into(),
-            max_try_ons: 4,
-            by_capacity: true,
-            max_viewers: 64,
-            max_formats: 8,
-            idle_s: 30,
-            camera_silence_ms: 700,
-            garments_late_ms: 700,
-            hosts: Vec::new(),
-            origins: Vec::new(),
-            public: String::new(),
-            renderer: RendererChoice::Auto,
-        }
-    }
 }
