@@ -2,23 +2,32 @@
 //! none do. A step up that fails makes the next one wait longer.
 
 use std::time::{Duration, Instant};
+use tryon::geometry::settings;
 use tryon_proto::v1::ClothDetail;
 
 /// Time over which exposures are counted. Longer reacts later, shorter takes a hiccup for a load.
 const WINDOW: Duration = Duration::from_secs(2);
-/// Share of exposures with garments below which detail is given up, and from which a window counts as calm.
-const LEAST_SHARE: f64 = 0.75;
-const CALM_SHARE: f64 = 0.95;
-/// Share of the interval between exposures that cloth must take: giving up less would not help.
-const LEAST_COST: f64 = 0.15;
-/// Rates of bodies (Hz) below which skinned cloth gives way to the plain mirror, and from which it returns.
-const MIRROR_RATE: f64 = 4.0;
-const RETURN_RATE: f64 = 8.0;
 /// Calm windows before a step up: at first, and at most.
 const PATIENCE: u32 = 4;
 const MOST_PATIENCE: u32 = 64;
 /// Windows after a step up in which a step down counts as its failure.
 const TRIAL: u32 = 15;
+
+settings! {
+    /// Settings of the detail of cloth.
+    pub struct LadderSettings {
+        /// Share of exposures with garments below which detail is given up.
+        pub least_share: f64 = 0.75,
+        /// Share of exposures with garments from which a window counts as calm.
+        pub calm_share: f64 = 0.95,
+        /// Share of the interval between exposures that cloth must take: giving up less would not help.
+        pub least_cost: f64 = 0.15,
+        /// Rate of bodies (Hz) below which skinned cloth gives way to the plain mirror.
+        pub mirror_rate: f64 = 4.0,
+        /// Rate of bodies (Hz) from which skinned cloth returns.
+        pub return_rate: f64 = 8.0,
+    }
+}
 
 /// Exposures of a window.
 #[derive(Clone, Copy, Debug)]
@@ -43,6 +52,7 @@ impl Window {
 /// Detail of one session.
 #[derive(Debug)]
 pub(crate) struct DetailLadder {
+    settings: LadderSettings,
     detail: ClothDetail,
     window: Window,
     /// Calm windows in a row, and as many as a step up needs.
@@ -56,6 +66,7 @@ impl DetailLadder {
     /// Full detail.
     pub(crate) fn new(now: Instant) -> Self {
         Self {
+            settings: LadderSettings::default(),
             detail: ClothDetail::Full,
             window: Window::new(now),
             calm: 0,
@@ -91,7 +102,9 @@ impl DetailLadder {
         self.since_up = self.since_up.saturating_add(1);
         if self.must_step_down(share, rate, cost) {
             self.step_down();
-        } else if share >= CALM_SHARE || self.detail == ClothDetail::None && rate >= RETURN_RATE {
+        } else if share >= self.settings.calm_share
+            || self.detail == ClothDetail::None && rate >= self.settings.return_rate
+        {
             self.calm += 1;
             self.step_up();
         } else {
@@ -100,9 +113,10 @@ impl DetailLadder {
     }
 
     fn must_step_down(&self, share: f64, rate: f64, cost: f64) -> bool {
+        let s = &self.settings;
         match self.detail {
-            ClothDetail::Full | ClothDetail::Coarse => share < LEAST_SHARE && cost > LEAST_COST,
-            ClothDetail::Skinned => share < LEAST_SHARE && rate < MIRROR_RATE,
+            ClothDetail::Full | ClothDetail::Coarse => share < s.least_share && cost > s.least_cost,
+            ClothDetail::Skinned => share < s.least_share && rate < s.mirror_rate,
             _ => false,
         }
     }

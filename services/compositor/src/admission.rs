@@ -5,22 +5,29 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 use tokio::time::Instant;
 use tokio_util::sync::CancellationToken;
+use tryon::geometry::settings;
 use tryon_kit::load::{Load, LoadMeter};
 
 /// Interval of readings.
 const READ_EVERY: Duration = Duration::from_millis(500);
-/// Share of the processors that try-ons may take together. Less refuses earlier, more lets hiccups cost pictures.
-const FULL: f64 = 0.92;
-/// Processors that a try-on takes before one was measured: a person in a T-shirt at 30 Hz on the bars' machine.
-const FIRST_COST: f64 = 0.8;
 /// Time from the opening of a try-on until it takes what it will take: it is found, measured and dressed.
 const SETTLED: Duration = Duration::from_secs(6);
-/// Weight of a reading.
-const WEIGHT: f64 = 0.2;
-/// Weight of a reading above what others took so far: the start of the services themselves is no load that stays.
-const RISE: f64 = 0.02;
-/// Fall of the cost a reading: try-ons cost little while nobody is in view, and people come back. Half in six minutes.
-const FORGETTING: f64 = 0.001;
+
+settings! {
+    /// Settings of the admission.
+    pub struct AdmissionSettings {
+        /// Share of the processors that try-ons may take together. Less refuses earlier, more lets hiccups cost pictures.
+        pub full: f64 = 0.92,
+        /// Processors that a try-on takes before one was measured: a person in a T-shirt at 30 Hz on the bars' machine.
+        pub first_cost: f64 = 0.8,
+        /// Weight of a reading.
+        pub weight: f64 = 0.2,
+        /// Weight of a reading above what others took so far: the start of the services themselves is no load that stays.
+        pub rise: f64 = 0.02,
+        /// Fall of the cost a reading: try-ons cost little while nobody is in view, and people come back. Half in six minutes.
+        pub forgetting: f64 = 0.001,
+    }
+}
 
 /// Measured capacity. Clones share it.
 #[derive(Clone, Debug, Default)]
@@ -28,6 +35,7 @@ pub(crate) struct Admission(Arc<Mutex<Capacity>>);
 
 #[derive(Debug)]
 struct Capacity {
+    settings: AdmissionSettings,
     /// Processors that one try-on takes, and those that everything else takes.
     cost: f64,
     others: f64,
@@ -38,8 +46,10 @@ struct Capacity {
 
 impl Default for Capacity {
     fn default() -> Self {
+        let settings = AdmissionSettings::default();
         Self {
-            cost: FIRST_COST,
+            cost: settings.first_cost,
+            settings,
             others: 0.0,
             processors: None,
             opened: None,
@@ -92,9 +102,9 @@ impl Capacity {
         self.processors = Some(load.processors);
         if open == 0 {
             let weight = if load.busy > self.others {
-                RISE
+                self.settings.rise
             } else {
-                WEIGHT
+                self.settings.weight
             };
             self.others += weight * (load.busy - self.others);
             return;
@@ -102,7 +112,11 @@ impl Capacity {
         let is_settled = self.opened.is_none_or(|t| now - t >= SETTLED);
         if is_settled {
             let cost = (load.busy - self.others).max(0.0) / open as f64;
-            let weight = if cost > self.cost { WEIGHT } else { FORGETTING };
+            let weight = if cost > self.cost {
+                self.settings.weight
+            } else {
+                self.settings.forgetting
+            };
             self.cost += weight * (cost - self.cost);
         }
         metrics::gauge!("tryon_try_on_processors").set(self.cost);
@@ -111,7 +125,10 @@ impl Capacity {
     fn has_room(&self, open: usize) -> bool {
         // The first one is always let in: it has the ladder of detail.
         let wanted = self.others + self.cost * (open + 1) as f64;
-        open == 0 || self.processors.is_none_or(|all| wanted <= FULL * all)
+        open == 0
+            || self
+                .processors
+                .is_none_or(|all| wanted <= self.settings.full * all)
     }
 }
 
@@ -158,7 +175,7 @@ mod tests {
             };
             c.learn(load, 1, now);
         }
-        assert!((c.cost - FIRST_COST).abs() < 1e-12, "{c:?}");
+        assert!((c.cost - c.settings.first_cost).abs() < 1e-12, "{c:?}");
         c.opened = None;
         run(&mut c, 0.1, 1, now);
         assert!(c.cost > 0.7, "nobody was in view for a minute: {c:?}");

@@ -6,6 +6,7 @@
 use crate::encoding::Encoding;
 use std::collections::BTreeMap;
 use tokio::time::{Duration, Instant};
+use tryon::geometry::settings;
 
 /// Format of a picture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -15,19 +16,25 @@ pub(crate) struct Format {
     pub(crate) encoding: Encoding,
 }
 
-/// Share of the time that formats may take beyond the next exposure: the rate that the others lose at most. More serves
-/// large formats oftener.
-const SHARE: f64 = 0.04;
-/// Most seconds saved up: one picture of 2 Mpx.
-const SAVED_S: f64 = 0.04;
 /// Time after which a format that nobody wants is forgotten; viewers with a rate want theirs now and then.
 const FORGOTTEN: Duration = Duration::from_secs(60);
-/// Weight of a new measurement of costs and intervals.
-const WEIGHT: f64 = 0.2;
-/// Interval before two exposures have come (s).
-const FIRST_INTERVAL_S: f64 = 0.033;
-/// Cost of a pixel before anything was measured (s): 640×480 in 6 ms.
-const FIRST_PIXEL_S: f64 = 2e-8;
+
+settings! {
+    /// Settings of the choice of formats.
+    pub struct FormatSettings {
+        /// Share of the time that formats may take beyond the next exposure: the rate that the others lose at most. More serves
+        /// large formats oftener.
+        pub share: f64 = 0.04,
+        /// Most seconds saved up: one picture of 2 Mpx.
+        pub saved_s: f64 = 0.04,
+        /// Weight of a new measurement of costs and intervals.
+        pub weight: f64 = 0.2,
+        /// Interval before two exposures have come (s).
+        pub first_interval_s: f64 = 0.033,
+        /// Cost of a pixel before anything was measured (s): 640×480 in 6 ms.
+        pub first_pixel_s: f64 = 2e-8,
+    }
+}
 
 /// Viewers of a format.
 #[derive(Clone, Copy, Debug)]
@@ -49,6 +56,7 @@ struct Known {
 
 /// Costs of the formats of one try-on.
 pub(crate) struct Formats {
+    settings: FormatSettings,
     known: BTreeMap<Format, Known>,
     /// Seconds that may be overdrawn; negative after a large picture.
     credit: f64,
@@ -58,10 +66,12 @@ pub(crate) struct Formats {
 
 impl Default for Formats {
     fn default() -> Self {
+        let settings = FormatSettings::default();
         Self {
+            settings,
             known: BTreeMap::new(),
-            credit: SAVED_S,
-            interval: FIRST_INTERVAL_S,
+            credit: settings.saved_s,
+            interval: settings.first_interval_s,
             last: None,
         }
     }
@@ -118,24 +128,24 @@ impl Formats {
 
     /// Takes the measured time of a format into account.
     pub(crate) fn record(&mut self, format: Format, cost: Duration) {
-        let cost = cost.as_secs_f64();
+        let (cost, weight) = (cost.as_secs_f64(), self.settings.weight);
         if let Some(k) = self.known.get_mut(&format) {
-            k.cost = Some(k.cost.map_or(cost, |c| c + WEIGHT * (cost - c)));
+            k.cost = Some(k.cost.map_or(cost, |c| c + weight * (cost - c)));
         }
     }
 
     fn pass_time(&mut self, now: Instant) {
         if let Some(last) = self.last.replace(now) {
             let passed = now.saturating_duration_since(last).as_secs_f64();
-            self.interval += WEIGHT * (passed.min(1.0) - self.interval);
-            self.credit = (self.credit + SHARE * passed).min(SAVED_S);
+            self.interval += self.settings.weight * (passed.min(1.0) - self.interval);
+            self.credit = (self.credit + self.settings.share * passed).min(self.settings.saved_s);
         }
     }
 
     /// Highest measured cost of a pixel (s): small pictures cost more a pixel, so unmeasured large ones are overrated.
     fn pixel_cost(&self, area: &impl Fn(&Format) -> f64) -> f64 {
         let measured = (self.known.iter()).filter_map(|(f, k)| Some(k.cost? / area(f)));
-        measured.fold(FIRST_PIXEL_S, f64::max)
+        measured.fold(self.settings.first_pixel_s, f64::max)
     }
 }
 

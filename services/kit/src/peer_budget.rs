@@ -43,9 +43,24 @@ impl Bucket {
         is_left
     }
 
+    /// Adds what the time and `earned` give; no more than the burst is kept.
+    pub(crate) fn earn(&mut self, earned: f64, now: Instant) {
+        (self.left, self.at) = (self.left_with(earned, now), now);
+    }
+
+    /// Pays for `events`; false when the budget is overdrawn.
+    pub(crate) fn pay(&mut self, events: f64) -> bool {
+        self.left -= events;
+        self.left >= 0.0
+    }
+
     fn left(&self, now: Instant) -> f64 {
+        self.left_with(0.0, now)
+    }
+
+    fn left_with(&self, earned: f64, now: Instant) -> f64 {
         let gained = now.saturating_duration_since(self.at).as_secs_f64();
-        (self.left + gained * self.allowance.per_second).min(self.allowance.burst)
+        (self.left + gained * self.allowance.per_second + earned).min(self.allowance.burst)
     }
 }
 

@@ -4,14 +4,13 @@ use crate::args::ExportArgs;
 use anyhow::{Context, Result, bail};
 use std::path::Path;
 use std::process::ExitCode;
-use tryon::body::{BoneTransforms, Pose, embedded, skin};
+use tryon::body::{BoneTransforms, Pose, embedded};
 use tryon::cloth;
 use tryon::dressing::{DressOptions, dress};
 use tryon::formats::gltf::{GlbMesh, write_glb, write_glb_motion};
 use tryon::formats::obj::write_obj;
 use tryon::garment::{GarmentMesh, Pattern, Size, Triangulation, library};
 use tryon::geometry::math::{P3, V3, World};
-use tryon::geometry::par::Par;
 use tryon::synth::{Actor, Sequence, Setting};
 
 /// Runs the command.
@@ -144,14 +143,7 @@ fn simulate(
     let mut frames = Vec::new();
     for i in 0..count {
         let mut bones = BoneTransforms::default();
-        pose(sequence, i).bones(template.skeleton(), rest, &mut bones);
-        skin(
-            Par::Rayon,
-            &rest.vertices,
-            template.weights(),
-            &bones,
-            &mut body,
-        );
+        template.skin_pose(rest, &pose(sequence, i), &mut bones, &mut body);
         let input = cloth::Input {
             body: &body,
             dt: 1.0 / FRAMES,

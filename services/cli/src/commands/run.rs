@@ -2,6 +2,7 @@
 
 use crate::args::RunArgs;
 use crate::input;
+use crate::overlay::tinted;
 use crate::preview::repetition;
 use crate::report::{OffPersonSummary, Samples, Summary, peak_memory, write};
 use anyhow::{Context, Result, ensure};
@@ -10,11 +11,7 @@ use std::collections::BTreeMap;
 use std::process::ExitCode;
 use tryon::formats::image::write_png_rgb;
 use tryon::formats::{RgbdSource, open_recording};
-use tryon::geometry::camera::{Calibration, ColorImage, RgbdFrame};
-use tryon::geometry::math::{P3, V3};
-use tryon::geometry::mesh::{Topology, TriMesh, vertex_normals};
-use tryon::geometry::par::{Par, with_threads};
-use tryon::geometry::raster::{View, VisibilityBuffer, rasterise};
+use tryon::geometry::par::with_threads;
 use tryon::mirror::{Mirror, MirrorFrame};
 use tryon::tracking::{LostReason, Status};
 
@@ -221,7 +218,7 @@ fn dress_all(
         if args.overlay {
             let path = args.out.join(format!("frame_{index:06}_body.png"));
             let mesh = mirror.template().mesh().clone();
-            let picture = overlay(mirror.posed_body(), &mesh, &frame, &calibration)?;
+            let picture = tinted(mirror.posed_body(), &mesh, &frame, &calibration)?;
             write_png_rgb(&path, &picture)?;
         }
         report.frames += 1;
@@ -230,73 +227,6 @@ fn dress_all(
     bar.finish_and_clear();
     report.sizes = mirror.notes().to_vec();
     Ok(measured.into_report(report))
-}
-
-/// Nearest surface of the overlay (m): no body of a recording is nearer.
-const NEAR: f32 = 0.05;
-/// Colour of the overlay, sRGB.
-const TINT: [f32; 3] = [80.0, 200.0, 255.0];
-/// Share of light on a surface seen edge-on.
-const AMBIENT: f32 = 0.3;
-
-/// The tracked body, shaded by its normals, half transparent over the picture.
-fn overlay(
-    vertices: &[P3],
-    mesh: &TriMesh,
-    frame: &RgbdFrame,
-    calibration: &Calibration,
-) -> Result<ColorImage> {
-    let topology = Topology::new(mesh)?;
-    let mut normals = Vec::new();
-    vertex_normals(
-        Par::Rayon,
-        vertices,
-        mesh.faces(),
-        topology.vertex_faces(),
-        &mut normals,
-    );
-    let camera = calibration.depth;
-    let mut seen = VisibilityBuffer::default();
-    rasterise(
-        &View::Perspective { camera, near: NEAR },
-        vertices,
-        mesh.faces(),
-        &mut seen,
-    );
-    let mut picture = match &frame.color {
-        Some(c) if (c.width(), c.height()) == (camera.width, camera.height) => c.clone(),
-        _ => depth_picture(frame),
-    };
-    for (i, &face) in seen
-        .face
-        .iter()
-        .enumerate()
-        .filter(|(_, f)| **f != VisibilityBuffer::NONE)
-    {
-        let n = mesh.faces()[face as usize]
-            .iter()
-            .fold(V3::zeros(), |s, &v| s + normals[v as usize]);
-        let light = (-n.z / n.norm().max(f32::MIN_POSITIVE)).clamp(0.0, 1.0);
-        for (c, tint) in TINT.iter().enumerate() {
-            let p = &mut picture.data_mut()[3 * i + c];
-            *p = (0.5 * f32::from(*p) + 0.5 * tint * (AMBIENT + (1.0 - AMBIENT) * light)) as u8;
-        }
-    }
-    Ok(picture)
-}
-
-/// Depth as grey: near is bright, missing readings are black.
-fn depth_picture(frame: &RgbdFrame) -> ColorImage {
-    /// Distance of the darkest grey (mm), and that grey.
-    const FARTHEST_MM: f32 = 5000.0;
-    const DARKEST: f32 = 0.05;
-    let mut out = ColorImage::filled(frame.depth.width(), frame.depth.height(), [0; 3]);
-    for (p, &mm) in out.data_mut().chunks_exact_mut(3).zip(frame.depth.data()) {
-        if mm > 0 {
-            p.fill((255.0 * (1.0 - f32::from(mm) / FARTHEST_MM).clamp(DARKEST, 1.0)) as u8);
-        }
-    }
-    out
 }
 
 #[cfg(test)]

@@ -20,12 +20,9 @@ use tryon::geometry::camera::ColorImage;
 use tryon::geometry::math::P3;
 use tryon::geometry::par::{Par, with_threads};
 use tryon::mirror::{
-    DressedOutfit, FrameClock, MirrorError, OfflineDrapeReport, OfflineOutfit, OfflineRun,
-    OutfitPainter, time_step,
+    DressedOutfit, FrameClock, MirrorError, NOMINAL_INTERVAL, OfflineDrapeReport, OfflineOutfit,
+    OfflineRun, OutfitPainter, time_step,
 };
-
-/// Nominal time between frames of the animation (s).
-const INTERVAL: f32 = 1.0 / 30.0;
 
 /// Frames after the wanted one that are tried when its cloth intersects too much to start from: one second.
 const LATER_STARTS: usize = 30;
@@ -330,7 +327,12 @@ impl<'a> Animation<'a> {
             })
             .collect();
         let motion = if frames.len() > 1 { &motion[..] } else { &[] };
-        write_glb_motion(&self.args.out.join("outfit.glb"), &meshes, motion, INTERVAL)?;
+        write_glb_motion(
+            &self.args.out.join("outfit.glb"),
+            &meshes,
+            motion,
+            NOMINAL_INTERVAL as f32,
+        )?;
         Ok(())
     }
 }

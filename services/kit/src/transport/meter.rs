@@ -5,7 +5,7 @@
 use super::frames::{ACK, DATA, Frames, HEAD, HEADERS, PING, Part};
 use super::ledger::Ledger;
 use crate::connections::Seat;
-use crate::peer_budget::Allowance;
+use crate::peer_budget::{Allowance, Bucket};
 use crate::queue::consumption::Consumption;
 use std::io;
 use std::pin::Pin;
@@ -13,6 +13,7 @@ use std::sync::Arc;
 use std::task::{Context, Poll, ready};
 use std::time::Instant;
 use tokio::io::{AsyncRead, AsyncWrite, ReadBuf};
+use tryon::geometry::settings;
 
 /// Reads and frames for which nothing was paid. One costs 5 to 10 µs, so that 512 connections at this rate take a tenth
 /// of a core. A client without calls pings each 10 s.
@@ -20,17 +21,23 @@ const ALLOWANCE: Allowance = Allowance {
     burst: 200.0,
     per_second: 20.0,
 };
-/// Credit of a call: its frames, and the window updates of its answer.
-const PER_CALL: f64 = 6.0;
-/// Bytes sent that pay for a read or frame: a reader acknowledges its pictures' bytes, at worst frame by frame. The
-/// answer to a PING has 17.
-const BYTES_SENT: f64 = 256.0;
-/// Bytes of a call's message that pay for a read or frame: uploads come in reads of a packet or more.
-const BYTES_RECEIVED: f64 = 512.0;
 /// Payload of the PINGs that this layer adds, which the server's own do not have.
 const QUESTION: [u8; 8] = *b"consumed";
-/// Credit of such a PING: its answer, and the window updates that come with it.
-const PER_QUESTION: f64 = 6.0;
+
+settings! {
+    /// Credit of a connection, in reads and frames.
+    pub struct CreditSettings {
+        /// Credit of a call: its frames, and the window updates of its answer.
+        pub per_call: f64 = 6.0,
+        /// Bytes sent that pay for a read or frame: a reader acknowledges its pictures' bytes, at worst frame by frame. The
+        /// answer to a PING has 17.
+        pub bytes_sent: f64 = 256.0,
+        /// Bytes of a call's message that pay for a read or frame: uploads come in reads of a packet or more.
+        pub bytes_received: f64 = 512.0,
+        /// Credit of a PING that this layer adds: its answer, and the window updates that come with it.
+        pub per_question: f64 = 6.0,
+    }
+}
 
 /// Contents of some bytes of a client.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -55,23 +62,6 @@ impl Counted {
     }
 }
 
-/// Credit of a connection.
-struct Credit {
-    left: f64,
-    at: Instant,
-}
-
-impl Credit {
-    /// Adds what the time and `earned` give; no more than the burst is kept.
-    fn earn(&mut self, earned: f64, now: Instant) {
-        let gained = now.saturating_duration_since(self.at).as_secs_f64() * ALLOWANCE.per_second;
-        *self = Self {
-            left: (self.left + gained + earned).min(ALLOWANCE.burst),
-            at: now,
-        };
-    }
-}
-
 /// A PING between frames, whose answer brings the window updates that a reader would send with the next frame.
 struct Question {
     /// Bytes still to be written.
@@ -93,6 +83,7 @@ impl Question {
 
 /// A connection within its budget; above encryption, where frames are seen.
 pub(super) struct Metered<Io> {
+    settings: CreditSettings,
     io: Io,
     seat: Arc<Seat>,
     received: Frames,
@@ -100,13 +91,14 @@ pub(super) struct Metered<Io> {
     ledger: Ledger,
     consumption: Consumption,
     question: Question,
-    credit: Credit,
+    credit: Bucket,
     has_spoken: bool,
 }
 
 impl<Io> Metered<Io> {
     pub(super) fn new(io: Io, seat: Arc<Seat>, consumption: Consumption) -> Self {
         Self {
+            settings: CreditSettings::default(),
             io,
             seat,
             received: Frames::of_client(),
@@ -117,10 +109,7 @@ impl<Io> Metered<Io> {
                 left: 0,
                 is_answered: true,
             },
-            credit: Credit {
-                left: ALLOWANCE.burst,
-                at: Instant::now(),
-            },
+            credit: Bucket::full(ALLOWANCE, Instant::now()),
             has_spoken: false,
         }
     }
@@ -156,10 +145,10 @@ impl<Io> Metered<Io> {
     }
 
     fn pay(&mut self, counted: Counted) -> io::Result<()> {
-        let earned = f64::from(counted.calls) * PER_CALL + counted.data as f64 / BYTES_RECEIVED;
+        let s = &self.settings;
+        let earned = f64::from(counted.calls) * s.per_call + counted.data as f64 / s.bytes_received;
         self.credit.earn(earned, Instant::now());
-        self.credit.left -= 1.0 + f64::from(counted.frames);
-        if self.credit.left >= 0.0 {
+        if self.credit.pay(1.0 + f64::from(counted.frames)) {
             return Ok(());
         }
         metrics::counter!("tryon_connections_flooding").increment(1);
@@ -167,8 +156,8 @@ impl<Io> Metered<Io> {
     }
 
     fn on_written(&mut self, bytes: &[u8]) {
-        self.credit
-            .earn(bytes.len() as f64 / BYTES_SENT, Instant::now());
+        let earned = bytes.len() as f64 / self.settings.bytes_sent;
+        self.credit.earn(earned, Instant::now());
         self.sent.read(bytes, |part, _| self.ledger.on_sent(part));
     }
 }
@@ -190,7 +179,7 @@ impl<Io: AsyncWrite + Unpin> Metered<Io> {
                     left: Question::BYTES,
                     is_answered: false,
                 };
-                self.credit.earn(PER_QUESTION, Instant::now());
+                self.credit.earn(self.settings.per_question, Instant::now());
             }
         }
         let mut is_written = false;
