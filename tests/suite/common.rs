@@ -1,10 +1,9 @@
 //! Shared data, standing bodies and single cloth steps for the tests of this binary.
 
-use tryon::body::{BoneTransforms, Pose, RestBody, Template, skin};
+use tryon::body::{BoneTransforms, Pose, RestBody, Template};
 use tryon::cloth::ClothError;
 use tryon::cloth::{Input, Model, State, StepReport, Workspace, step};
 use tryon::geometry::math::{Body, P3, Rigid, World};
-use tryon::geometry::par::Par;
 
 /// Standing with the arms hanging down.
 pub(crate) fn arms_down(template: &Template, rest: &RestBody) -> Pose<World> {
@@ -29,13 +28,6 @@ pub(crate) fn step_on(
 /// Skin of a body in a pose (m).
 pub(crate) fn posed(template: &Template, rest: &RestBody, pose: &Pose<World>) -> Vec<P3> {
     let (mut bones, mut body) = (BoneTransforms::default(), Vec::new());
-    pose.bones(template.skeleton(), rest, &mut bones);
-    skin(
-        Par::Rayon,
-        &rest.vertices,
-        template.weights(),
-        &bones,
-        &mut body,
-    );
+    template.skin_pose(rest, pose, &mut bones, &mut body);
     body
 }

@@ -1,9 +1,9 @@
 //! Mesh garments on bodies that they were not made on, and sizes that cannot be worn.
 
-use crate::common::posed;
+use crate::common::{posed, step_on};
 use std::path::{Path, PathBuf};
 use tryon::body::{BodyShape, Pose, RestBody, Template, embedded};
-use tryon::cloth::{Config, Input, Workspace, step};
+use tryon::cloth::{Config, Workspace};
 use tryon::dressing::{
     DressError, DressOptions, Dressed, GarmentSource, MeshGarment, MeshGarmentSettings, SourceBody,
     dress, dress_all,
@@ -161,16 +161,7 @@ fn hats_follow_the_head_rigidly() {
             .iter()
             .map(|p| p + nalgebra::Vector3::new(0.0, 0.0, 0.033 * i as f32))
             .collect();
-        step(
-            &d.model,
-            &mut d.state,
-            &Input {
-                body: &body,
-                dt: 1.0 / 30.0,
-            },
-            &mut work,
-        )
-        .expect("a step");
+        step_on(&d.model, &mut d.state, &body, &mut work).expect("a step");
     }
     for (a, b) in before.iter().zip(&d.state.garments[0].positions) {
         let moved = b - a;

@@ -65,6 +65,7 @@ fn empty_frames_lose_and_find_again() {
     let (Some(template), Some(scene)) = (template(), recorded(105)) else {
         return;
     };
+    let usual = mean(&quiet(&template, &scene).joints_mm);
     for gap in [1usize, 5, 15, 30] {
         let blind = scene.clone().blind(50..50 + gap);
         let mut kept: Option<Pose> = None;
@@ -72,7 +73,7 @@ fn empty_frames_lose_and_find_again() {
             &template,
             &TrackerConfig::default(),
             &blind,
-            |i, _, state, _, _| {
+            |i, _, state, report, _| {
                 if (50..50 + gap).contains(&i) {
                     assert_eq!(
                         state.status,
@@ -81,17 +82,17 @@ fn empty_frames_lose_and_find_again() {
                         },
                         "frame {i}"
                     );
+                    let kept = kept.get_or_insert(state.pose.clone());
                     assert_eq!(
-                        kept.get_or_insert(state.pose.clone()),
-                        &state.pose,
-                        "the last good pose is kept"
+                        (report.pose_age as usize, &state.pose),
+                        (i - 49, &*kept),
+                        "the last good pose is kept, with its age"
                     );
                 }
             },
         );
         // Blind frames have no truth, so the tenth frame after the gap stands ten after frame 50.
         let back = out.joints_mm[50 - 30 + 10];
-        let usual = mean(&quiet(&template, &scene).joints_mm);
         eprintln!(
             "{gap} empty frames: {back:.1} mm ten frames later, {usual:.1} on average without"
         );

@@ -2,25 +2,22 @@
 
 #![allow(
     clippy::print_stdout,
+    missing_docs,
+    unreachable_pub,
     reason = "a skipped test must be loud, and the script says what it saw"
 )]
 
+#[allow(dead_code, reason = "other programs use the rest")]
+#[path = "chain/kiosk.rs"]
+mod kiosk;
+
+use anyhow::{Result, bail, ensure};
+use kiosk::{Kiosk, Part};
 use std::io::{BufRead, BufReader, Write};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
-use std::sync::Arc;
 use std::time::Duration;
-
-use anyhow::{Result, anyhow, bail, ensure};
-use tokio::runtime::Runtime;
-use tokio_util::sync::CancellationToken;
-use tryon_kit::auth::Auth;
-use tryon_kit::compute::Pool;
-use tryon_kit::config::Config;
-use tryon_kit::flow::Stalls;
-use tryon_kit::frames::LocalBus;
-use tryon_kit::server::{Context, Running};
-use tryon_kit::tls::Tls;
+use tryon_kit::Config;
 
 /// Longest run of the browser: all steps with two restarts take a minute on two idle cores; a hung browser is ended
 /// here.
@@ -76,114 +73,21 @@ fn modules_of_the_page_and_names_in_deploy() -> Result<()> {
     Ok(())
 }
 
-/// All services in one process, each of which can be ended and restarted at its address.
-struct Chain {
-    runtime: Runtime,
-    bus: Arc<LocalBus>,
-    pool: Arc<Pool>,
-    config: Config,
-    running: Vec<(&'static str, CancellationToken, Running)>,
-}
-
-impl Chain {
-    fn start() -> Result<Self> {
-        let runtime = tokio::runtime::Builder::new_multi_thread()
-            .enable_all()
-            .build()?;
-        let pool = Pool::new(0)?;
-        let anywhere = ([127, 0, 0, 1], 0).into();
-        let mut config = Config::default();
-        // A debug build on busy cores is slow; other tests judge lateness.
-        config.compositor.garments_late_ms = 3000;
-        config.capture.address = anywhere;
-        config.tracking.address = anywhere;
-        config.cloth.address = anywhere;
-        config.compositor.address = anywhere;
-        config.capture.admin = anywhere;
-        config.tracking.admin = anywhere;
-        config.cloth.admin = anywhere;
-        config.compositor.admin = anywhere;
-        let mut chain = Self {
-            runtime,
-            bus: LocalBus::new(pool.clone()),
-            pool,
-            config,
-            running: Vec::new(),
-        };
-        for name in ["capture", "tracking", "cloth", "compositor"] {
-            chain.start_one(name)?;
-        }
-        Ok(chain)
-    }
-
-    fn start_one(&mut self, name: &'static str) -> Result<()> {
-        let shutdown = CancellationToken::new();
-        let ctx = Context {
-            stalls: Stalls::default(),
-            bus: self.bus.clone(),
-            pool: self.pool.clone(),
-            shutdown: shutdown.clone(),
-            grace: Duration::from_millis(200),
-            auth: Auth::off(),
-            tls: Tls::off(),
-            inside: Tls::off(),
-        };
-        let config = &self.config;
-        let running = self.runtime.block_on(async {
-            match name {
-                "capture" => tryon_capture_service::start(config, ctx).await,
-                "tracking" => tryon_tracking_service::start(config, ctx).await,
-                "cloth" => tryon_cloth_service::start(config, ctx).await,
-                _ => tryon_compositor_service::start(config, ctx).await,
-            }
-        })?;
-        let (at, url) = (running.address, format!("http://{}", running.address));
-        match name {
-            "capture" => {
-                self.config.capture.address = at;
-                self.config.compositor.capture = url;
-            }
-            "tracking" => {
-                self.config.tracking.address = at;
-                self.config.cloth.tracking.clone_from(&url);
-                self.config.compositor.tracking = url;
-            }
-            "cloth" => {
-                self.config.cloth.address = at;
-                self.config.compositor.cloth = url;
-            }
-            _ => self.config.compositor.address = at,
-        }
-        self.running.push((name, shutdown, running));
-        Ok(())
-    }
-
-    fn end_one(&mut self, name: &str) -> Result<()> {
-        let at = self
-            .running
-            .iter()
-            .position(|(n, ..)| *n == name)
-            .ok_or_else(|| anyhow!("{name} does not run"))?;
-        let (_, shutdown, running) = self.running.remove(at);
-        shutdown.cancel();
-        self.runtime.block_on(running.ended())?;
-        Ok(())
-    }
-}
-
 /// Services in the order in which they are ended: one behind the compositor, then the compositor itself.
-const BROKEN: [&str; 2] = ["cloth", "compositor"];
+const BROKEN: [Part; 2] = [Part::Cloth, Part::Compositor];
 
 #[test]
 fn a_shopper_in_chromium() -> Result<()> {
     if missing("the page in a browser", true) {
         return Ok(());
     }
-    let mut chain = Chain::start()?;
+    // A debug build on busy cores is slow; other tests judge lateness.
+    let late = |c: &mut Config| c.compositor.garments_late_ms = 3000;
+    let mut kiosk = Kiosk::with("synth", 0.0, late);
     let out = Path::new(env!("CARGO_TARGET_TMPDIR")).join("browser");
     let mut script = Command::new("node")
         .arg("mirror.mjs")
-        .arg(format!("http://{}/", chain.config.compositor.address))
+        .arg(format!("http://{}/", kiosk.config.compositor.address))
         .args([
             "--stdio",
             "--rounds",
@@ -215,9 +119,9 @@ fn a_shopper_in_chromium() -> Result<()> {
     for line in BufReader::new(output).lines() {
         let line = line?;
         match line.as_str() {
-            "BREAK" => chain.end_one(BROKEN[round])?,
+            "BREAK" => drop(kiosk.stop(BROKEN[round])),
             "MEND" => {
-                chain.start_one(BROKEN[round])?;
+                kiosk.restart(BROKEN[round]);
                 round += 1;
             }
             _ => {
