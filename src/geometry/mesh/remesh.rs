@@ -45,14 +45,6 @@ pub struct Remesher<'a> {
     border: Vec<bool>,
 }
 
-/// Smallest number of faces around border vertices.
-fn least_faces(border: Border) -> usize {
-    match border {
-        Border::Rim => 1,
-        Border::MirrorPlane => LEAST_FACES,
-    }
-}
-
 impl<'a> Remesher<'a> {
     /// Starts from a manifold mesh with positions in metres.
     pub fn new(points: Vec<P3d>, faces: Vec<Face>, spec: RemeshSpec<'a>) -> Self {
@@ -74,6 +66,14 @@ impl<'a> Remesher<'a> {
     /// The mesh with vertices numbered anew, without unused ones.
     pub fn finish(self) -> (Vec<P3d>, Vec<Face>) {
         self.mesh.compact()
+    }
+
+    /// Smallest number of faces around a vertex.
+    fn least_faces(&self, v: u32) -> usize {
+        match self.spec.border {
+            Border::Rim if self.border[v as usize] => 1,
+            _ => LEAST_FACES,
+        }
     }
 
     /// Edge length over the mean target of its ends.
@@ -145,7 +145,7 @@ impl<'a> Remesher<'a> {
         };
         let size = (self.spec.target)(&p);
         if !self.keeps_topology(keep, drop, shared)
-            || !self.keeps_lengths(keep, drop, shared, (&p, size))
+            || !self.keeps_lengths(keep, drop, shared, &p, size)
             || self.turns_faces(keep, drop, shared, &p)
         {
             return;
@@ -161,19 +161,15 @@ impl<'a> Remesher<'a> {
         rk.iter().filter(|v| rd.binary_search(v).is_ok()).count() == shared.len()
     }
 
-    /// No edge becomes too long, and every vertex keeps enough faces.
-    fn keeps_lengths(&self, keep: u32, drop: u32, shared: &[u32], to: (&P3d, f64)) -> bool {
-        let least = |v: u32| match self.border[v as usize] {
-            true => least_faces(self.spec.border),
-            false => LEAST_FACES,
-        };
+    /// No edge becomes too long when both ends go to `p`, and every vertex keeps enough faces; `size` is the target there.
+    fn keeps_lengths(&self, keep: u32, drop: u32, shared: &[u32], p: &P3d, size: f64) -> bool {
         let (rk, rd) = (self.mesh.ring(keep), self.mesh.ring(drop));
         let mut around = rk.iter().chain(&rd).filter(|v| **v != keep && **v != drop);
         around.all(|&v| {
-            let length = (self.mesh.points[v as usize] - to.0).norm();
+            let length = (self.mesh.points[v as usize] - p).norm();
             let opposite = shared.iter().any(|f| self.mesh.has_corner(*f, v));
-            length <= self.settings.split * 0.5 * (to.1 + self.sizes[v as usize])
-                && !(opposite && self.mesh.around[v as usize].len() <= least(v))
+            length <= self.settings.split * 0.5 * (size + self.sizes[v as usize])
+                && !(opposite && self.mesh.around[v as usize].len() <= self.least_faces(v))
         })
     }
 
@@ -223,11 +219,8 @@ impl<'a> Remesher<'a> {
         let s = &self.settings;
         let better =
             after < before && q1 > s.flip_keeps * q0 || q0 < s.flip_poor && q1 > s.flip_gain * q0;
-        let least = |v: u32| match self.border[v as usize] {
-            true => least_faces(self.spec.border) as i32,
-            false => LEAST_FACES as i32,
-        };
-        if !better || valence(a) <= least(a) || valence(b) <= least(b) {
+        let is_least = |v: u32| valence(v) <= self.least_faces(v) as i32;
+        if !better || is_least(a) || is_least(b) {
             return false;
         }
         let [n0, n1] = flip.before.map(|f| normal(self.mesh.corners(&f)));
