@@ -119,7 +119,8 @@ fn a_photo_is_fetched_once_and_ends_with_its_try_on() {
     });
 }
 
-fn get(address: SocketAddr, path: &str) -> Vec<u8> {
+/// Answer of a port to an HTTP request.
+pub fn get(address: SocketAddr, path: &str) -> Vec<u8> {
     let mut s = TcpStream::connect(address).expect("connects");
     let head = format!("GET {path} HTTP/1.1\r\nHost: {address}\r\nConnection: close\r\n\r\n");
     s.write_all(head.as_bytes()).expect("sends");

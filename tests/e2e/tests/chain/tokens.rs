@@ -137,16 +137,17 @@ async fn ask(connection: Connection, question: MessageRequest) -> Result<Message
     Ok(answer.and_then(|a| a.message_response).expect("an answer"))
 }
 
-/// Every method of a port but health's.
-async fn methods(connection: Connection) -> Vec<Method> {
-    let list = ask(
-        connection.clone(),
-        MessageRequest::ListServices(String::new()),
-    )
-    .await;
+/// Names of the services of a port.
+pub async fn services(connection: Connection) -> Vec<String> {
+    let list = ask(connection, MessageRequest::ListServices(String::new())).await;
     let MessageResponse::ListServicesResponse(list) = list.expect("listed") else {
         panic!("no list");
     };
+    list.service.into_iter().map(|s| s.name).collect()
+}
+
+/// Every method of a port but health's.
+async fn methods(connection: Connection) -> Vec<Method> {
     let reflection = "/grpc.reflection.v1.ServerReflection/ServerReflectionInfo";
     let mut found: Vec<Method> = [reflection.to_owned(), reflection.replace("v1", "v1alpha")]
         .map(|path| Method {
@@ -154,7 +155,7 @@ async fn methods(connection: Connection) -> Vec<Method> {
             has_session: false,
         })
         .into();
-    for service in list.service.into_iter().map(|s| s.name) {
+    for service in services(connection.clone()).await {
         if service.starts_with("grpc.health") {
             continue;
         }

@@ -1,10 +1,13 @@
 //! One try-on from its opening to its end: pictures, fit, other outfits, a mesh garment, a snapshot.
 
 use crate::client;
+use crate::consent::get;
 use crate::kiosk::{Kiosk, PARTS, Part, Watcher, wear};
+use crate::tokens::services;
 use std::time::Instant;
 use tonic::Code;
 use tonic::transport::Channel;
+use tryon_kit::auth::Credentials;
 use tryon_proto::v1::compositor_service_client::CompositorServiceClient;
 use tryon_proto::v1::stream_frames_response::Event;
 use tryon_proto::v1::*;
@@ -95,14 +98,15 @@ async fn every_part_is_healthy(kiosk: &Kiosk) {
         let status = r.expect("health").into_inner().status();
         assert_eq!(status, ServingStatus::Serving);
         for page in ["/readyz", "/metrics"] {
-            let answer = http(kiosk.admin(part), page);
-            assert!(answer.starts_with("HTTP/1.1 200"), "{part:?} {page}");
+            let answer = get(kiosk.admin(part), page);
+            assert!(answer.starts_with(b"HTTP/1.1 200"), "{part:?} {page}");
         }
     }
-    let services = reflected(kiosk).await;
+    let connection = Credentials::none().present(kiosk.channel(Part::Compositor));
+    let services = services(connection).await;
     assert!(services.contains(&"tryon.v1.CompositorService".to_owned()));
-    let page = http(kiosk.config.compositor.address, "/");
-    assert!(page.contains("<html"), "the page");
+    let page = get(kiosk.config.compositor.address, "/");
+    assert!(String::from_utf8_lossy(&page).contains("<html"), "the page");
 }
 
 /// Size, revision, codec, stages and garments off the person of the first live picture.
@@ -239,48 +243,4 @@ async fn regular_end(c: &mut CompositorServiceClient<Channel>, w: &mut Watcher) 
         }
     };
     assert!(is_closed && end.code() == Code::Ok, "{end}");
-}
-
-fn http(address: std::net::SocketAddr, path: &str) -> String {
-    use std::io::{Read, Write};
-    let mut s = std::net::TcpStream::connect(address).expect("connects");
-    write!(
-        s,
-        "GET {path} HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n"
-    )
-    .expect("sends");
-    let mut out = String::new();
-    s.read_to_string(&mut out).expect("answers");
-    out
-}
-
-async fn reflected(kiosk: &Kiosk) -> Vec<String> {
-    use tonic_reflection::pb::v1::server_reflection_request::MessageRequest;
-    use tonic_reflection::pb::v1::server_reflection_response::MessageResponse;
-    use tonic_reflection::pb::v1::{
-        ServerReflectionRequest, server_reflection_client::ServerReflectionClient,
-    };
-    let list = Some(MessageRequest::ListServices(String::new()));
-    let r = ServerReflectionRequest {
-        host: String::new(),
-        message_request: list,
-    };
-    let mut c = ServerReflectionClient::new(kiosk.channel(Part::Compositor));
-    let mut answers = c
-        .server_reflection_info(tokio_stream::once(r))
-        .await
-        .expect("reflection")
-        .into_inner();
-    match answers
-        .message()
-        .await
-        .expect("fine")
-        .expect("an answer")
-        .message_response
-    {
-        Some(MessageResponse::ListServicesResponse(l)) => {
-            l.service.into_iter().map(|s| s.name).collect()
-        }
-        other => panic!("{other:?}"),
-    }
 }
