@@ -9,7 +9,7 @@ use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use tryon_body::{PosedSkin, Template};
+use tryon_body::Template;
 use tryon_formats::FormatError;
 use tryon_formats::image::{read_color, write_png_rgb};
 use tryon_formats::npy::{read_npy, write_npy};
@@ -21,7 +21,6 @@ const VERSION: u32 = 2;
 const HEADER: &str = "capture.json";
 /// Folder of the scans' results.
 const FRAMES: &str = "frames";
-
 /// Folder of the garments' textures.
 const TEXTURES: &str = "textures";
 
@@ -48,10 +47,8 @@ pub struct FrameDisplacements {
 impl FrameDisplacements {
     /// Displacements of a captured scan.
     pub fn of(template: &Template, frame: &FrameCapture) -> Self {
-        let undressed = &frame.undressed;
-        let all = 0..undressed.vertices.len();
-        let rest = PosedSkin::new(template, &undressed.bones).unpose(all, &undressed.vertices);
-        let shape = template.personalise(&undressed.body.shape).vertices;
+        let rest = frame.undressed.rest(template);
+        let shape = template.personalise(&frame.undressed.body.shape).vertices;
         Self {
             body: rest.iter().zip(&shape).map(|(a, b)| a - b).collect(),
             garments: frame.displacements.clone(),
@@ -94,13 +91,9 @@ impl CaptureArchive {
         let archive = Self {
             folder: folder.to_owned(),
         };
-        let header = archive.header(template)?.ok_or_else(|| {
-            FormatError::field(
-                &archive.folder.join(HEADER),
-                HEADER,
-                "the folder holds no capture",
-            )
-        })?;
+        let path = archive.folder.join(HEADER);
+        let fault = || FormatError::field(&path, HEADER, "the folder holds no capture");
+        let header = archive.header(template)?.ok_or_else(fault)?;
         Ok((archive, header))
     }
 
@@ -127,19 +120,14 @@ impl CaptureArchive {
     /// # Errors
     /// A file that cannot be written.
     pub fn write_header(&self, header: &CaptureHeader) -> Result<(), FormatError> {
-        let header = CaptureHeader {
-            version: VERSION,
-            ..header.clone()
-        };
+        let mut header = header.clone();
+        header.version = VERSION;
         write_json(&self.folder.join(HEADER), &header)
     }
 
-    fn record_path(&self, scan: &str) -> PathBuf {
-        self.folder.join(FRAMES).join(format!("{scan}.json"))
-    }
-
-    fn array_path(&self, scan: &str, name: &str) -> PathBuf {
-        self.folder.join(FRAMES).join(format!("{scan}.{name}.npy"))
+    /// File of a scan's result.
+    fn path(&self, scan: &str, end: &str) -> PathBuf {
+        self.folder.join(FRAMES).join(format!("{scan}.{end}"))
     }
 
     /// Result of a scan; `None` if it isn't done.
@@ -151,7 +139,7 @@ impl CaptureArchive {
         scan: &str,
         template: &Template,
     ) -> Result<Option<FrameRecord>, FormatError> {
-        let path = self.record_path(scan);
+        let path = self.path(scan, "json");
         if !path.exists() {
             return Ok(None);
         }
@@ -171,11 +159,11 @@ impl CaptureArchive {
         displacements: &FrameDisplacements,
     ) -> Result<(), FormatError> {
         let scan = &record.scan;
-        write_vectors(&self.array_path(scan, "body"), &displacements.body)?;
+        write_vectors(&self.path(scan, "body.npy"), &displacements.body)?;
         for (k, garment) in displacements.garments.iter().enumerate() {
-            write_vectors(&self.array_path(scan, &format!("garment{k}")), garment)?;
+            write_vectors(&self.path(scan, &format!("garment{k}.npy")), garment)?;
         }
-        write_json(&self.record_path(scan), record)
+        write_json(&self.path(scan, "json"), record)
     }
 
     /// Gives a scan that is unchanged the result of the one before; its record says so.
@@ -186,18 +174,13 @@ impl CaptureArchive {
         &self,
         before: &FrameRecord,
         scan: &str,
-        (header, template): (&CaptureHeader, &Template),
+        header: &CaptureHeader,
+        template: &Template,
     ) -> Result<FrameRecord, FormatError> {
         let displacements = self.displacements(&before.scan, header, template)?;
-        let report = FrameReport {
-            repeated: true,
-            ..before.report.clone()
-        };
-        let record = FrameRecord {
-            scan: scan.to_owned(),
-            body: before.body.clone(),
-            report,
-        };
+        let mut record = before.clone();
+        scan.clone_into(&mut record.scan);
+        record.report.repeated = true;
         self.write_frame(&record, &displacements)?;
         Ok(record)
     }
@@ -231,8 +214,8 @@ impl CaptureArchive {
         let atlases = header.outfit.atlases.iter().enumerate();
         let read = atlases.map(|(k, atlas)| {
             let [image, seen] = self.texture_paths(k);
-            let texture =
-                GarmentTexture::from_images(atlas, read_color(&image)?, &read_color(&seen)?);
+            let images = (read_color(&image)?, read_color(&seen)?);
+            let texture = GarmentTexture::from_images(atlas, images.0, &images.1);
             let size = [atlas.size.width, atlas.size.height];
             texture.ok_or_else(|| FormatError::field(&image, "size", format!("not {size:?}")))
         });
@@ -249,12 +232,12 @@ impl CaptureArchive {
         header: &CaptureHeader,
         template: &Template,
     ) -> Result<FrameDisplacements, FormatError> {
-        let read = |name: &str, count| read_vectors(&self.array_path(scan, name), count);
+        let read = |name: &str, count| read_vectors(&self.path(scan, name), count);
         let parts = header.outfit.cloth.parts.iter().enumerate();
-        let garments = parts.map(|(k, part)| read(&format!("garment{k}"), part.nodes.len()));
+        let garments = parts.map(|(k, part)| read(&format!("garment{k}.npy"), part.nodes.len()));
         Ok(FrameDisplacements {
             // The clothed template has further vertices where a skirt joins its legs.
-            body: read("body", template.mesh().vertices().len())?,
+            body: read("body.npy", template.mesh().vertices().len())?,
             garments: garments.collect::<Result<_, _>>()?,
         })
     }
@@ -273,16 +256,10 @@ fn read_vectors(path: &Path, count: usize) -> Result<Vec<V3>, FormatError> {
         return Err(FormatError::field(path, "shape", why));
     }
     if let Some(at) = flat.iter().position(|v| !v.is_finite()) {
-        return Err(FormatError::field(
-            path,
-            format!("row {}", at / 3),
-            "not finite",
-        ));
+        let row = format!("row {}", at / 3);
+        return Err(FormatError::field(path, row, "not finite"));
     }
-    Ok(flat
-        .chunks_exact(3)
-        .map(|c| V3::new(c[0], c[1], c[2]))
-        .collect())
+    Ok(flat.chunks_exact(3).map(V3::from_column_slice).collect())
 }
 
 fn read_json<T: DeserializeOwned>(path: &Path) -> Result<T, FormatError> {
@@ -291,11 +268,10 @@ fn read_json<T: DeserializeOwned>(path: &Path) -> Result<T, FormatError> {
 }
 
 fn write_json(path: &Path, value: &impl Serialize) -> Result<(), FormatError> {
-    let text = serde_json::to_string(value)
-        .map_err(|e| FormatError::field(path, "json", e.to_string()))?;
-    write_beside(path, |part| {
-        std::fs::write(part, text).map_err(|e| FormatError::io(part, e))
-    })
+    let text = serde_json::to_string(value);
+    let text = text.map_err(|e| FormatError::field(path, "json", e.to_string()))?;
+    let write = |part: &Path| std::fs::write(part, text).map_err(|e| FormatError::io(part, e));
+    write_beside(path, write)
 }
 
 /// Writes beside the file and renames, so that a kill leaves the old one or the new one.
@@ -303,9 +279,9 @@ fn write_beside(
     path: &Path,
     write: impl FnOnce(&Path) -> Result<(), FormatError>,
 ) -> Result<(), FormatError> {
-    let mut name = path.as_os_str().to_owned();
-    name.push(".part");
-    let beside = PathBuf::from(name);
+    let mut beside = path.as_os_str().to_owned();
+    beside.push(".part");
+    let beside = PathBuf::from(beside);
     write(&beside)?;
     std::fs::rename(&beside, path).map_err(|e| FormatError::io(path, e))
 }

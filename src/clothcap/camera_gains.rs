@@ -7,6 +7,7 @@
 use super::align::Alignment;
 use super::scan::BodyScan;
 use super::segment::{BodyRegion, bone_slices};
+use super::settings::{CameraGainSettings, LabelSettings};
 use nalgebra::{SMatrix, SVector};
 use std::collections::BTreeMap;
 use std::f32::consts::TAU;
@@ -16,24 +17,6 @@ use tryon_geometry::math::order_statistics::median;
 
 /// Azimuths at which the gain is known, 15° apart.
 const AZIMUTHS: usize = 24;
-/// Height of a ring along its bone, metres.
-const RING: f32 = 0.04;
-/// Distance up to which a point shows the surface below it, metres.
-const NEAR: f32 = 0.03;
-/// Horizontal part of a normal from which it has an azimuth: less and less of a gain is known below.
-const LEVEL: f32 = 0.3;
-/// Least points of a ring at an azimuth that have a vote.
-const LEAST_POINTS: f32 = 3.0;
-/// Brightness added before logarithms, of 255: ratios of dark colours are noise.
-const DARK: f32 = 12.0;
-/// Logarithm of a ratio from which differences count by their size only: garments differ by more than light and gains.
-const ROBUST: f64 = 0.05;
-/// Rounds of reweighting.
-const ROUNDS: usize = 30;
-/// Weight of the difference of neighbouring azimuths, and of a gain itself, in votes.
-const SMOOTH: [f64; 2] = [4.0, 0.5];
-/// Largest logarithm of a gain: white balance and exposure of one camera type.
-const LARGEST: f64 = 0.4;
 
 type Gains = SVector<f64, AZIMUTHS>;
 
@@ -51,13 +34,14 @@ pub(super) fn without_gains(
     scan: &BodyScan,
     alignment: &Alignment,
     template: &Template,
+    settings: &LabelSettings,
 ) -> Option<BodyScan> {
     if !scan.is_cloud || scan.colors.is_empty() {
         return None;
     }
-    let directions = Directions::of(alignment, template);
-    let rings = rings(scan, alignment, (template, &directions));
-    let gains: [Gains; 3] = std::array::from_fn(|channel| solve(&rings, channel));
+    let directions = Directions::of(alignment, template, settings.gains.level);
+    let rings = rings(scan, alignment, template, &directions, settings);
+    let gains: [Gains; 3] = std::array::from_fn(|channel| solve(&rings, channel, &settings.gains));
     let even = |(color, node): (&[u8; 3], usize)| {
         std::array::from_fn(|c| {
             let gain = directions.gain(node, &gains[c]);
@@ -75,20 +59,18 @@ pub(super) fn without_gains(
 struct Directions {
     /// Azimuth in steps, within 0 to [`AZIMUTHS`]; shape `[vertices]`.
     azimuths: Vec<f32>,
-    /// Share of the gain, see [`LEVEL`]; shape `[vertices]`.
+    /// Share of the gain; shape `[vertices]`.
     levels: Vec<f32>,
 }
 
 impl Directions {
-    fn of(alignment: &Alignment, template: &Template) -> Self {
+    fn of(alignment: &Alignment, template: &Template, level: f32) -> Self {
         let normals = template.normals(&alignment.model);
+        let share = |n: &V3| (n.xz().norm() / level).min(1.0);
         let azimuth = |n: &V3| n.x.atan2(n.z).rem_euclid(TAU) / TAU * AZIMUTHS as f32;
         Self {
             azimuths: normals.iter().map(azimuth).collect(),
-            levels: normals
-                .iter()
-                .map(|n| (n.xz().norm() / LEVEL).min(1.0))
-                .collect(),
+            levels: normals.iter().map(share).collect(),
         }
     }
 
@@ -106,31 +88,31 @@ impl Directions {
 fn nodes(alignment: &Alignment, template: &Template) -> impl Iterator<Item = usize> {
     let faces = template.mesh().faces();
     let matches = alignment.matches.iter();
-    matches.map(|m| faces[m.face as usize][m.nearest_corner()] as usize)
+    matches.map(|m| m.nearest_vertex(faces) as usize)
 }
 
 /// Colours by ring and azimuth; heads have faces before and hair behind, and are left out.
 fn rings(
     scan: &BodyScan,
     alignment: &Alignment,
-    (template, directions): (&Template, &Directions),
+    template: &Template,
+    directions: &Directions,
+    settings: &LabelSettings,
 ) -> Vec<Vec<(usize, RingColor)>> {
+    let gains = &settings.gains;
     let regions = BodyRegion::of_vertices(template);
-    let ring_of = bone_slices(template, RING);
+    let ring_of = bone_slices(template, gains.ring);
     let mut cells: BTreeMap<(usize, i32), BTreeMap<usize, RingColor>> = BTreeMap::new();
     let nodes = nodes(alignment, template).zip(&alignment.matches);
     for ((node, m), color) in nodes.zip(&scan.colors) {
-        let is_used = m.weight > 0.0 && m.distance < NEAR;
+        let is_used = m.weight > 0.0 && m.distance < settings.near;
         if !is_used || regions[node] == BodyRegion::Head {
             continue;
         }
         let azimuth = directions.azimuths[node] as usize % AZIMUTHS;
-        let cell = cells
-            .entry(ring_of[node])
-            .or_default()
-            .entry(azimuth)
-            .or_default();
-        (0..3).for_each(|c| cell.logs[c] += (f32::from(color[c]) + DARK).ln());
+        let ring = cells.entry(ring_of[node]).or_default();
+        let cell = ring.entry(azimuth).or_default();
+        (0..3).for_each(|c| cell.logs[c] += (f32::from(color[c]) + gains.dark).ln());
         cell.level += directions.levels[node];
         cell.count += 1.0;
     }
@@ -144,25 +126,30 @@ fn rings(
         (azimuth, mean)
     };
     let ring = |cells: BTreeMap<usize, RingColor>| {
-        let many = cells.into_iter().filter(|(_, s)| s.count >= LEAST_POINTS);
+        let is_voter = |s: &RingColor| s.count >= gains.least_points;
+        let many = cells.into_iter().filter(|(_, s)| is_voter(s));
         many.map(mean).collect()
     };
     cells.into_values().map(ring).collect()
 }
 
 /// Logarithms of the gains of a channel by azimuth: with them, each ring has about one colour all around.
-fn solve(rings: &[Vec<(usize, RingColor)>], channel: usize) -> Gains {
+fn solve(
+    rings: &[Vec<(usize, RingColor)>],
+    channel: usize,
+    settings: &CameraGainSettings,
+) -> Gains {
     let mut gains = Gains::zeros();
     let mut weights: Vec<Vec<f64>> = rings.iter().map(|r| vec![1.0; r.len()]).collect();
-    for _ in 0..ROUNDS {
-        let mut h = SMatrix::<f64, AZIMUTHS, AZIMUTHS>::identity() * SMOOTH[1];
+    for _ in 0..settings.rounds {
+        let mut h = SMatrix::<f64, AZIMUTHS, AZIMUTHS>::identity() * settings.own;
         let mut g = Gains::zeros();
         for k in 0..AZIMUTHS {
             let next = (k + 1) % AZIMUTHS;
-            h[(k, k)] += SMOOTH[0];
-            h[(next, next)] += SMOOTH[0];
-            h[(k, next)] -= SMOOTH[0];
-            h[(next, k)] -= SMOOTH[0];
+            h[(k, k)] += settings.smooth;
+            h[(next, next)] += settings.smooth;
+            h[(k, next)] -= settings.smooth;
+            h[(next, k)] -= settings.smooth;
         }
         // The colour of a ring is eliminated: its weighted mean less that of its gains.
         for (ring, weights) in rings.iter().zip(&weights) {
@@ -184,23 +171,26 @@ fn solve(rings: &[Vec<(usize, RingColor)>], channel: usize) -> Gains {
             return Gains::zeros();
         };
         gains = factor.solve(&g);
-        for (ring, weights) in rings.iter().zip(&mut weights) {
-            reweigh(ring, channel, (&gains, weights));
-        }
+        let reweighed = |ring: &Vec<_>| robust_weights(ring, channel, &gains, settings.robust);
+        weights = rings.iter().map(reweighed).collect();
     }
-    gains.map(|g| g.clamp(-LARGEST, LARGEST))
+    gains.map(|g| g.clamp(-settings.largest, settings.largest))
 }
 
-/// Weights by which differences from the ring's colour count by their size, not its square.
-fn reweigh(ring: &[(usize, RingColor)], channel: usize, (gains, weights): (&Gains, &mut [f64])) {
-    let left = ring
-        .iter()
-        .map(|(k, cell)| f64::from(cell.logs[channel]) - f64::from(cell.level) * gains[*k]);
-    let left: Vec<f64> = left.collect();
+/// Weights by which differences from the ring's colour count by their size, not its square, from `robust` on.
+fn robust_weights(
+    ring: &[(usize, RingColor)],
+    channel: usize,
+    gains: &Gains,
+    robust: f64,
+) -> Vec<f64> {
+    let left = |(k, cell): &(usize, RingColor)| {
+        f64::from(cell.logs[channel]) - f64::from(cell.level) * gains[*k]
+    };
+    let left: Vec<f64> = ring.iter().map(left).collect();
     let middle = median(&mut left.clone()).unwrap_or(0.0);
-    for (w, x) in weights.iter_mut().zip(&left) {
-        *w = ROBUST / (x - middle).abs().max(ROBUST);
-    }
+    let weight = |x: &f64| robust / (x - middle).abs().max(robust);
+    left.iter().map(weight).collect()
 }
 
 #[cfg(test)]
@@ -250,8 +240,8 @@ mod tests {
             matches,
             report: AlignmentReport::default(),
         };
-        let out = without_gains(&scan, &alignment, &template).expect("a cloud");
-        (scan, out.colors)
+        let out = without_gains(&scan, &alignment, &template, &LabelSettings::default());
+        (scan, out.expect("a cloud").colors)
     }
 
     /// Mean ratio of front to back of the thighs, by channel.
@@ -259,8 +249,8 @@ mod tests {
         let template = embedded::template();
         let regions = BodyRegion::of_vertices(&template);
         let mean = |front: bool, c: usize| {
-            let own = (0..colors.len())
-                .filter(|v| regions[*v] == BodyRegion::Thigh && (scan.points[*v].z > 0.0) == front);
+            let own = (0..colors.len()).filter(|v| regions[*v] == BodyRegion::Thigh);
+            let own = own.filter(|v| (scan.points[*v].z > 0.0) == front);
             let own: Vec<f32> = own.map(|v| f32::from(colors[v][c])).collect();
             own.iter().sum::<f32>() / own.len().max(1) as f32
         };
@@ -269,38 +259,26 @@ mod tests {
 
     #[test]
     fn gains_of_two_cameras_are_divided_out() {
-        let paint = |p: &P3| {
-            if p.y > 1.0 {
-                [60.0, 90.0, 150.0]
-            } else {
-                [110.0, 100.0, 80.0]
-            }
+        let paint = |p: &P3| match p.y > 1.0 {
+            true => [60.0, 90.0, 150.0],
+            false => [110.0, 100.0, 80.0],
         };
         let (scan, colors) = evened(paint, [1.3, 1.0, 0.8]);
         let [before, after] = [&scan.colors, &colors].map(|c| ratio(&scan, c));
-        assert!(
-            (before[0] - 1.3).abs() < 0.1 && (before[2] - 0.8).abs() < 0.1,
-            "{before:?}"
-        );
+        assert!((before[0] - 1.3).abs() < 0.1 && (before[2] - 0.8).abs() < 0.1);
         assert!(after.iter().all(|r| (r - 1.0).abs() < 0.05), "{after:?}");
     }
 
     #[test]
     fn a_front_in_another_colour_keeps_it() {
         let is_front = |p: &P3| (1.0..1.35).contains(&p.y) && p.z > 0.03 && p.x.abs() < 0.12;
-        let paint = |p: &P3| {
-            if is_front(p) {
-                [220.0; 3]
-            } else {
-                [70.0, 80.0, 110.0]
-            }
+        let paint = |p: &P3| match is_front(p) {
+            true => [220.0; 3],
+            false => [70.0, 80.0, 110.0],
         };
         let (scan, colors) = evened(paint, [1.0; 3]);
-        let changed = scan
-            .colors
-            .iter()
-            .zip(&colors)
-            .map(|(a, b)| a[0].abs_diff(b[0]));
+        let changed = scan.colors.iter().zip(&colors);
+        let changed = changed.map(|(a, b)| a[0].abs_diff(b[0]));
         assert!(changed.max() < Some(15), "{:?}", ratio(&scan, &colors));
     }
 }

@@ -2,28 +2,27 @@
 
 use super::CaptureError;
 use super::align::{
-    AlignedBody, Alignment, AlignmentReport, ClothedTemplate, QueryCounts, Start, VertexCounts,
+    AlignedBody, Aligner, Alignment, AlignmentReport, ClothedTemplate, QueryCounts, Start,
+    VertexCounts,
 };
 use super::captured_outfit::CapturedOutfit;
 use super::layers::clear_body;
-use super::multi::{MultiCloth, PartFit, PartFitConfig};
+use super::multi::{ClothPart, MultiCloth, PartFit};
 use super::part_fitter::{PartFitter, rest};
 use super::retarget::{PenetrationSolver, SolidBody};
 use super::scan::{BodyScan, LeftOut};
 use super::segment::{BodyRegion, LabelConfig, unseen_regions};
 use super::segmenter::{ScanSegmenter, SegmentedScan};
+use super::settings::{
+    AlignmentSettings, PartFitConfig, PenetrationSettings, TextureSettings, UndressSettings,
+};
 use super::texture::{GarmentTexture, ScanPaint};
 use super::topology::ClothTemplate;
-use super::undress::{
-    ShapeScan, Undressed, Undresser, WornGarments, minimally_clothed, posed_under_cloth,
-};
+use super::undress::{CoveredScan, Undressed, Undresser};
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
-use tryon_body::{BodyShape, PosedSkin, Template};
+use tryon_body::{BodyShape, Template};
 use tryon_geometry::math::{P3, V3};
-
-/// Mean robust distance of a scan from the body model above which it says nothing of the subject's shape, metres.
-const MISALIGNED: f64 = 0.03;
 
 /// Capture of one scan.
 #[derive(Clone, Debug)]
@@ -68,13 +67,21 @@ pub struct FrameReport {
     pub repeated: bool,
 }
 
-/// Settings of a capture.
+/// Settings of the capture of an outfit.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct CaptureConfig {
+pub struct OutfitCaptureConfig {
     /// Segmentation.
     pub labels: LabelConfig,
     /// Fit of the parts.
     pub parts: PartFitConfig,
+    /// Single-mesh alignment.
+    pub align: AlignmentSettings,
+    /// Body under the cloth.
+    pub undress: UndressSettings,
+    /// Garments moved out of the body.
+    pub penetration: PenetrationSettings,
+    /// Textures.
+    pub texture: TextureSettings,
     /// Nothing is skipped: every point is searched in every iteration, every turn tried.
     pub without_skips: bool,
     /// Shape of the subject from a scan in minimal clothing; without it the clothed scans give it.
@@ -85,7 +92,7 @@ pub struct CaptureConfig {
 #[derive(Debug)]
 pub struct OutfitCapture {
     template: Arc<Template>,
-    config: CaptureConfig,
+    config: OutfitCaptureConfig,
     segmenter: ScanSegmenter,
     undresser: Undresser,
     solid: SolidBody,
@@ -104,26 +111,31 @@ impl OutfitCapture {
     ///
     /// # Errors
     /// [`CaptureError::Solve`] for a template too large.
-    pub fn new(template: Arc<Template>, config: CaptureConfig) -> Result<Self, CaptureError> {
-        let segmenter = ScanSegmenter::new(template.clone(), config.labels.clone())?;
-        Self::with_segmenter(template, config, segmenter)
+    pub fn new(template: Arc<Template>, config: OutfitCaptureConfig) -> Result<Self, CaptureError> {
+        let aligner = Aligner::new(template.clone(), config.align)?;
+        Self::with_aligner(template, config, aligner, None)
     }
 
-    fn with_segmenter(
+    fn with_aligner(
         template: Arc<Template>,
-        config: CaptureConfig,
-        mut segmenter: ScanSegmenter,
+        config: OutfitCaptureConfig,
+        mut aligner: Aligner,
+        outfit: Option<CapturedOutfit>,
     ) -> Result<Self, CaptureError> {
         if config.without_skips {
-            segmenter.skip_nothing();
+            aligner.skip_nothing();
         }
+        let first = outfit.as_ref().map(|o| o.labelling.clone());
+        let segmenter = ScanSegmenter::with_aligner(aligner, config.labels.clone(), first);
+        let (model, undress, penetration) =
+            (config.align.model, config.undress, config.penetration);
         Ok(Self {
             segmenter,
-            undresser: Undresser::new(template.clone())?,
-            solid: SolidBody::new(&template)?,
+            undresser: Undresser::new(template.clone(), model, undress, penetration)?,
+            solid: SolidBody::new(&template, penetration)?,
             template,
             config,
-            outfit: None,
+            outfit: outfit.map(Arc::new),
             shape_scans: Vec::new(),
             fits: Vec::new(),
             solvers: Vec::new(),
@@ -137,16 +149,13 @@ impl OutfitCapture {
     /// As [`OutfitCapture::new`].
     pub fn resume(
         template: Arc<Template>,
-        config: CaptureConfig,
+        config: OutfitCaptureConfig,
         outfit: CapturedOutfit,
-        state: (ClothedTemplate, AlignedBody),
+        clothed: ClothedTemplate,
+        last: AlignedBody,
     ) -> Result<Self, CaptureError> {
-        let (labels, first) = (config.labels.clone(), outfit.labelling.clone());
-        let segmenter = ScanSegmenter::resume(template.clone(), labels, first, state)?;
-        Ok(Self {
-            outfit: Some(Arc::new(outfit)),
-            ..Self::with_segmenter(template, config, segmenter)?
-        })
+        let aligner = Aligner::resume(template.clone(), config.align, clothed, last)?;
+        Self::with_aligner(template, config, aligner, Some(outfit))
     }
 
     /// Template of the surface, with or without legs joined.
@@ -156,7 +165,7 @@ impl OutfitCapture {
 
     /// Clothed template, once a scan is captured.
     pub fn clothed(&self) -> Option<&ClothedTemplate> {
-        self.segmenter.clothed()
+        self.segmenter.aligner.clothed()
     }
 
     /// Outfit, once a scan is captured.
@@ -193,10 +202,13 @@ impl OutfitCapture {
     /// [`CaptureError::NoPerson`], or [`CaptureError::NoGarment`] if the first scan shows none.
     pub fn frame(&mut self, scan: &BodyScan) -> Result<FrameCapture, CaptureError> {
         let segmented = self.segmenter.step(scan)?;
-        let covered = segmented.covered();
+        let covered = CoveredScan {
+            scan,
+            covered: &segmented.covered(),
+        };
         let subject = match &self.outfit {
             Some(outfit) => outfit.body.clone(),
-            None => self.subject((scan, &covered), &segmented)?,
+            None => self.subject(&covered, &segmented)?,
         };
 
         let known = self.outfit.clone();
@@ -207,12 +219,19 @@ impl OutfitCapture {
         // The first scan makes the outfit; nothing is skipped in it.
         let skips = known.is_some() && !self.config.without_skips;
         let cloth = self.segmenter.cloth();
-        let mut fitter = PartFitter::new(
-            &mut self.fits,
+        let parts = self.config.parts;
+        let mut fitter = PartFitter {
+            fits: &mut self.fits,
             cloth,
-            (scan, &segmented),
-            (&self.config.parts, skips),
-        );
+            scan,
+            segmented: &segmented,
+            near: &segmented.nearest_vertices(cloth),
+            config: PartFitConfig {
+                fit: parts.fit.skipping(skips),
+                ..parts
+            },
+            texture: &self.config.texture,
+        };
         let alignment = &segmented.alignment;
         let (outfit, fitted, body) = match known {
             Some(outfit) => {
@@ -221,7 +240,7 @@ impl OutfitCapture {
                     pose: alignment.body.pose.clone(),
                     shape: subject.shape,
                 };
-                let body = posed_under_cloth(&self.template, scan, &covered, start, skips)?;
+                let body = self.undresser.posed_under_cloth(&covered, start, skips)?;
                 (outfit, fitted, body)
             }
             None => {
@@ -229,26 +248,16 @@ impl OutfitCapture {
                 (Arc::new(outfit), fitted, subject)
             }
         };
-        let worn = WornGarments {
-            cloth: &outfit.cloth,
-            vertices: &fitted.vertices,
-        };
-        let undressed = self.undresser.run((scan, &covered), worn, body, skips)?;
-        self.segmenter.follow(&undressed.body);
+        let (parts, worn) = (&outfit.cloth, &fitted.vertices);
+        let undressed = self.undresser.run(&covered, parts, worn, body, skips)?;
+        self.segmenter.aligner.follow(&undressed.body);
         let garments = self.freed(&outfit, &fitted.vertices, &undressed)?;
-        self.paint(
-            (segmented.evened(scan), &segmented.labels),
-            &outfit,
-            &fitted.vertices,
-        );
+        self.paint(scan, &segmented, &outfit, &fitted.vertices);
+        let cloth = self.segmenter.cloth();
+        let matches = &segmented.alignment.matches;
         let out = FrameCapture {
             labels: segmented.parts(),
-            displacements: displacements(
-                self.segmenter.cloth(),
-                &outfit.cloth,
-                &garments,
-                &undressed,
-            ),
+            displacements: displacements(cloth, &outfit.cloth, &garments, &undressed),
             report: FrameReport {
                 alignment: alignment.report,
                 part_errors: fitted.errors,
@@ -256,10 +265,7 @@ impl OutfitCapture {
                 queries: fitted.queries,
                 vertices: fitted.vertex_counts,
                 left_out: scan.left_out,
-                unseen: unseen_regions(
-                    self.segmenter.cloth().template(),
-                    &segmented.alignment.matches,
-                ),
+                unseen: unseen_regions(cloth.template(), matches, &self.config.labels.settings),
                 repeated: false,
             },
             alignment: segmented.alignment,
@@ -273,7 +279,7 @@ impl OutfitCapture {
     /// Minimally clothed body in the first scan: of the given shape, or of that which it and the scans beside it show.
     fn subject(
         &mut self,
-        (scan, covered): (&BodyScan, &[bool]),
+        scan: &CoveredScan<'_>,
         first: &SegmentedScan,
     ) -> Result<AlignedBody, CaptureError> {
         if let Some(shape) = &self.config.minimal {
@@ -281,53 +287,54 @@ impl OutfitCapture {
                 shape: shape.clone(),
                 ..first.alignment.body.clone()
             };
-            return posed_under_cloth(&self.template, scan, covered, start, false);
+            return self.undresser.posed_under_cloth(scan, start, false);
         }
         let scans = std::mem::take(&mut self.shape_scans);
         let mut others: Vec<(SegmentedScan, &BodyScan)> = Vec::new();
-        if let Some(clothed) = self.segmenter.clothed().filter(|_| !scans.is_empty()) {
-            let state = (clothed.clone(), first.alignment.body.clone());
-            let (labels, labelling) = (self.config.labels.clone(), first.labelling.clone());
-            let mut segmenter =
-                ScanSegmenter::resume(self.template.clone(), labels, labelling, state)?;
+        if let Some(clothed) = self.clothed().filter(|_| !scans.is_empty()) {
+            let (clothed, last) = (clothed.clone(), first.alignment.body.clone());
+            let (template, config) = (self.template.clone(), &self.config);
+            let aligner = Aligner::resume(template, config.align, clothed, last)?;
+            let (labels, labelling) = (config.labels.clone(), first.labelling.clone());
+            let mut segmenter = ScanSegmenter::with_aligner(aligner, labels, Some(labelling));
             // A scan of this sequence that shows nobody is reported where it is captured.
             let all = scans.iter().map(|s| (segmenter.step(s), s));
             let found = all.filter_map(|(segmented, s)| Some((segmented.ok()?, s)));
-            let fits = |s: &SegmentedScan| s.alignment.report.model_error < MISALIGNED;
+            let most = config.undress.misaligned;
+            let fits = |s: &SegmentedScan| s.alignment.report.model_error < most;
             others = found.filter(|(s, _)| fits(s)).collect();
         }
-        let all = std::iter::once((first, scan)).chain(others.iter().map(|(s, b)| (s, *b)));
-        let covered: Vec<Vec<bool>> = all.clone().map(|(s, _)| s.covered()).collect();
-        let shape_scans: Vec<ShapeScan<'_>> = all
-            .zip(&covered)
-            .map(|((s, scan), covered)| ShapeScan {
-                scan,
-                covered,
-                body: &s.alignment.body,
-            })
-            .collect();
-        minimally_clothed(&self.template, &shape_scans)
+        let covered: Vec<Vec<bool>> = others.iter().map(|(s, _)| s.covered()).collect();
+        let beside = others.iter().zip(&covered);
+        let beside = beside.map(|((_, scan), covered)| CoveredScan { scan, covered });
+        let all: Vec<CoveredScan<'_>> = std::iter::once(*scan).chain(beside).collect();
+        let bodies = std::iter::once(first).chain(others.iter().map(|(s, _)| s));
+        let bodies = bodies.map(|s| s.alignment.body.clone()).collect();
+        self.undresser.minimally_clothed(&all, bodies)
     }
 
     /// Paints what no scan before showed of the garments with the points of their labels.
     fn paint(
         &mut self,
-        (scan, labels): (&BodyScan, &[u8]),
+        scan: &BodyScan,
+        segmented: &SegmentedScan,
         outfit: &CapturedOutfit,
         fitted: &[Vec<P3>],
     ) {
+        let scan = segmented.evened(scan);
         if scan.colors.is_empty() {
             return;
         }
+        let settings = &self.config.texture.paint;
         for (k, atlas) in outfit.atlases.iter().enumerate() {
             let (part, vertices) = (&outfit.cloth.parts[k], &fitted[k]);
             let colors = &outfit.colors[k];
             if k == self.textures.len() {
-                self.textures
-                    .push(GarmentTexture::of_vertices(atlas, colors));
+                let texture = GarmentTexture::of_vertices(atlas, colors);
+                self.textures.push(texture);
             }
-            let own = |i: usize| labels[i] == part.label;
-            let paint = ScanPaint::new(scan, own, (&part.faces, vertices));
+            let own = |i: usize| segmented.labels[i] == part.label;
+            let paint = ScanPaint::new(scan, own, &part.faces, vertices, settings);
             paint.apply(&mut self.textures[k], atlas, vertices, colors);
         }
     }
@@ -356,17 +363,13 @@ fn displacements(
     garments: &[Vec<P3>],
     undressed: &Undressed,
 ) -> Vec<Vec<V3>> {
-    let all = 0..undressed.vertices.len();
-    let skin = PosedSkin::new(surface.body(), &undressed.bones);
-    let body = surface.extend(&skin.unpose(all, &undressed.vertices));
-    let parts = cloth.parts.iter().zip(garments);
-    parts
-        .map(|(part, vertices)| {
-            let above = rest(surface, &undressed.bones, part, vertices);
-            let below = part.nodes.iter().map(|v| body[*v as usize]);
-            above.iter().zip(below).map(|(a, b)| a - b).collect()
-        })
-        .collect()
+    let body = surface.extend(&undressed.rest(surface.body()));
+    let displaced = |(part, vertices): (&ClothPart, &Vec<P3>)| {
+        let above = rest(surface, &undressed.bones, part, vertices);
+        let below = part.nodes.iter().map(|v| body[*v as usize]);
+        above.iter().zip(below).map(|(a, b)| a - b).collect()
+    };
+    cloth.parts.iter().zip(garments).map(displaced).collect()
 }
 
 #[cfg(test)]
@@ -379,17 +382,13 @@ mod tests {
     #[test]
     fn a_scan_that_fails_leaves_the_outfit_to_the_next() {
         let scans = [0.6, 0.7].map(|yaw| TestScan::new(yaw, [40, 70, 160], [90, 90, 95]).scan());
-        let template = embedded::template();
-        let mut capture =
-            OutfitCapture::new(template, CaptureConfig::default()).expect("a capture");
+        let config = OutfitCaptureConfig::default();
+        let mut capture = OutfitCapture::new(embedded::template(), config).expect("a capture");
         capture.frame(&scans[0]).expect("captured");
         let outfit = capture.outfit.clone().expect("an outfit");
         let coupling = std::mem::replace(&mut capture.config.parts.coupling, f64::NAN);
         let fault = capture.frame(&scans[1]);
-        assert!(
-            matches!(fault, Err(CaptureError::Solve { .. })),
-            "{fault:?}"
-        );
+        assert!(matches!(fault, Err(CaptureError::Solve { .. })));
         assert!(Arc::ptr_eq(&outfit, capture.outfit.as_ref().expect("kept")));
         capture.config.parts.coupling = coupling;
         let next = capture.frame(&scans[1]).expect("captured");

@@ -3,13 +3,14 @@
 
 use super::align::{AlignedBody, ClothedTemplate};
 use super::captured_outfit::CapturedOutfit;
-use super::multi::ClothPart;
+use super::multi::{ClothPart, Ring};
 use super::scan::ScanFrame;
 use super::topology::ClothTemplate;
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 use tryon_body::Template;
 use tryon_geometry::math::P3;
+use tryon_geometry::mesh::Face;
 
 /// Outfit of a capture and the state that later scans start from.
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -46,10 +47,22 @@ fn check_count(got: usize, expected: usize, field: &str) -> Result<(), Fault> {
 }
 
 fn check_finite(points: &[P3], field: &str) -> Result<(), Fault> {
-    let bad = points.iter().position(|p| !p.iter().all(|c| c.is_finite()));
-    check(bad.is_none(), field, || {
-        format!("entry {bad:?} is not finite")
+    check_all(points, field, "is not finite", |p| {
+        p.iter().all(|c| c.is_finite())
     })
+}
+
+/// Checks each entry; `fault` is that of one that isn't sound.
+fn check_all<T>(
+    all: &[T],
+    field: &str,
+    fault: &str,
+    is_sound: impl Fn(&T) -> bool,
+) -> Result<(), Fault> {
+    match all.iter().position(|v| !is_sound(v)) {
+        Some(entry) => Err((field.to_owned(), format!("entry {entry} {fault}"))),
+        None => Ok(()),
+    }
 }
 
 /// Checks pose and shape of a body.
@@ -68,7 +81,6 @@ pub(super) fn check_body(
 
 /// Checks a header.
 pub(super) fn check_header(header: &CaptureHeader, template: &Arc<Template>) -> Result<(), Fault> {
-    let bodies = template.mesh().vertices().len();
     check(header.template == template.name(), "template", || {
         format!("{}, expected {}", header.template, template.name())
     })?;
@@ -80,11 +92,10 @@ pub(super) fn check_header(header: &CaptureHeader, template: &Arc<Template>) -> 
         && frame.floor.is_none_or(f64::is_finite);
     check(is_frame, "frame", || "no unit and up axis".into())?;
     let legs = header.clothed.legs;
-    check(
-        header.outfit.cloth.legs == legs,
-        "outfit.cloth.legs",
-        || format!("{:?}, clothed.legs is {legs:?}", header.outfit.cloth.legs),
-    )?;
+    let own = header.outfit.cloth.legs;
+    check(own == legs, "outfit.cloth.legs", || {
+        format!("{own:?}, clothed.legs is {legs:?}")
+    })?;
     let surface = ClothTemplate::new(template, legs);
     let surface = surface.map_err(|e| ("clothed.legs".to_owned(), e.to_string()))?;
     let count = surface.template().mesh().vertices().len();
@@ -95,44 +106,29 @@ pub(super) fn check_header(header: &CaptureHeader, template: &Arc<Template>) -> 
     let outfit = &header.outfit;
     check_body(&outfit.body, template, "outfit.body")?;
     let labelling = &outfit.labelling;
-    let slots = labelling.slots.len();
-    check_count(
-        labelling.appearances.len(),
-        slots,
-        "outfit.labelling.appearances",
-    )?;
-    check_count(labelling.labels.len(), count, "outfit.labelling.labels")?;
-    let beyond = labelling
-        .labels
-        .iter()
-        .position(|l| usize::from(*l) >= slots);
-    check(beyond.is_none(), "outfit.labelling.labels", || {
-        format!("node {beyond:?}: its label has no slot")
-    })?;
+    let (slots, appearances) = (labelling.slots.len(), labelling.appearances.len());
+    check_count(appearances, slots, "outfit.labelling.appearances")?;
+    let labels = "outfit.labelling.labels";
+    check_count(labelling.labels.len(), count, labels)?;
+    let is_slot = |l: &u8| usize::from(*l) < slots;
+    check_all(&labelling.labels, labels, "has no slot", is_slot)?;
     let parts = outfit.cloth.parts.len();
     check_count(outfit.rest.len(), parts, "outfit.rest")?;
     check_count(outfit.colors.len(), parts, "outfit.colors")?;
     if !outfit.atlases.is_empty() {
         check_count(outfit.atlases.len(), parts, "outfit.atlases")?;
     }
+    let sizes = HeaderSizes {
+        nodes: count,
+        bodies: template.mesh().vertices().len(),
+        slots,
+    };
     for (k, part) in outfit.cloth.parts.iter().enumerate() {
-        check_part(
-            part,
-            (count, bodies),
-            slots,
-            &format!("outfit.cloth.parts[{k}]"),
-        )?;
-        check_count(
-            outfit.rest[k].len(),
-            part.nodes.len(),
-            &format!("outfit.rest[{k}]"),
-        )?;
-        check_count(
-            outfit.colors[k].len(),
-            part.nodes.len(),
-            &format!("outfit.colors[{k}]"),
-        )?;
-        check_finite(&outfit.rest[k], &format!("outfit.rest[{k}]"))?;
+        sizes.check(part, &format!("outfit.cloth.parts[{k}]"))?;
+        let (rest, colors) = (format!("outfit.rest[{k}]"), format!("outfit.colors[{k}]"));
+        check_count(outfit.rest[k].len(), part.nodes.len(), &rest)?;
+        check_count(outfit.colors[k].len(), part.nodes.len(), &colors)?;
+        check_finite(&outfit.rest[k], &rest)?;
         if let Some(atlas) = outfit.atlases.get(k) {
             let at = |(field, why)| (format!("outfit.atlases[{k}].{field}"), why);
             let checked = atlas.check(part.nodes.len(), part.faces.len());
@@ -142,42 +138,46 @@ pub(super) fn check_header(header: &CaptureHeader, template: &Arc<Template>) -> 
     Ok(())
 }
 
-fn check_part(
-    part: &ClothPart,
-    (count, bodies): (usize, usize),
+/// Fault of an index.
+const BEYOND: &str = "is beyond the last vertex";
+
+/// Counts that the indices of a part stay below.
+struct HeaderSizes {
+    nodes: usize,
+    bodies: usize,
     slots: usize,
-    field: &str,
-) -> Result<(), Fault> {
-    let own = part.nodes.len();
-    let at = |name: &str| format!("{field}.{name}");
-    check(usize::from(part.label) < slots, &at("label"), || {
-        format!("{} of {slots} slots", part.label)
-    })?;
-    let ascends = part.nodes.windows(2).all(|w| w[0] < w[1]);
-    check(ascends, &at("nodes"), || "not ascending".into())?;
-    let last = part.nodes.last().map_or(0, |v| *v as usize);
-    check(last < count, &at("nodes"), || {
-        format!("vertex {last} of {count}")
-    })?;
-    check_count(part.below.len(), own, &at("below"))?;
-    let beyond = part.below.iter().position(|v| *v as usize >= bodies);
-    check(beyond.is_none(), &at("below"), || {
-        format!("entry {beyond:?}: the body has {bodies} vertices")
-    })?;
-    check_count(part.hidden.len(), own, &at("hidden"))?;
-    let is_face = |f: &[u32; 3]| {
-        let distinct = f[0] != f[1] && f[1] != f[2] && f[0] != f[2];
-        distinct && f.iter().all(|v| (*v as usize) < own)
-    };
-    let bad = part.faces.iter().position(|f| !is_face(f));
-    check(bad.is_none(), &at("faces"), || {
-        format!("face {bad:?} of {own} vertices")
-    })?;
-    let bad = part
-        .rings
-        .iter()
-        .position(|r| r.vertices.iter().any(|v| *v as usize >= own));
-    check(bad.is_none(), &at("rings"), || {
-        format!("ring {bad:?} of {own} vertices")
-    })
+}
+
+impl HeaderSizes {
+    fn check(&self, part: &ClothPart, field: &str) -> Result<(), Fault> {
+        let own = part.nodes.len();
+        let at = |name: &str| format!("{field}.{name}");
+        let is_slot = usize::from(part.label) < self.slots;
+        check(is_slot, &at("label"), || {
+            format!("{} of {} slots", part.label, self.slots)
+        })?;
+        let ascends = part.nodes.windows(2).all(|w| w[0] < w[1]);
+        check(ascends, &at("nodes"), || "not ascending".into())?;
+        let last = part.nodes.last().map_or(0, |v| *v as usize);
+        check(last < self.nodes, &at("nodes"), || {
+            format!("vertex {last} of {}", self.nodes)
+        })?;
+        check_count(part.below.len(), own, &at("below"))?;
+        check_all(&part.below, &at("below"), BEYOND, |v| {
+            (*v as usize) < self.bodies
+        })?;
+        check_count(part.hidden.len(), own, &at("hidden"))?;
+        let is_face = |f: &Face| {
+            let distinct = f[0] != f[1] && f[1] != f[2] && f[0] != f[2];
+            distinct && f.iter().all(|v| (*v as usize) < own)
+        };
+        check_all(
+            &part.faces,
+            &at("faces"),
+            "is no triangle of its vertices",
+            is_face,
+        )?;
+        let is_ring = |r: &Ring| r.vertices.iter().all(|v| (*v as usize) < own);
+        check_all(&part.rings, &at("rings"), BEYOND, is_ring)
+    }
 }

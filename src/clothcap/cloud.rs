@@ -1,45 +1,27 @@
 //! Neighbours in a cloud without faces: normals, edges and strays.
 
+use super::settings::CloudSettings;
 use nalgebra::{Matrix3, Vector3};
+use std::collections::{HashMap, HashSet};
 use tryon_geometry::math::{P3, V3};
 use tryon_geometry::par::{self, Par};
 use tryon_geometry::spatial::HashGrid;
 
-/// Neighbours of a point in the plane of its normal: the fewest that make a plane.
-const NEIGHBOURS: [usize; 5] = [12, 24, 48, 96, 192];
-/// Radius of the search of the fewest as a multiple of the mean distance between points.
-const REACH: f32 = 3.0;
-/// Variance across a plane beside the smaller one along it, up to which points make one.
-const FLAT: f64 = 0.1;
-/// Neighbours of a point that share an edge with it in a cloud, and their largest distance as a multiple of the mean one.
-const BESIDE: (usize, f32) = (6, 2.0);
-/// Distance across which points are of one piece, as a multiple of the mean one.
-const LINK: f32 = 3.0;
-/// Largest share of the points of a piece that is a stray.
-const STRAY: f64 = 1e-3;
-/// Directions from which points are looked at, and the angle about the vertical from one to the next, radians.
-const DIRECTIONS: usize = 40;
-const GOLDEN: f32 = 2.399_963;
-/// Side of a cell of the pictures of these as a multiple of the mean distance between points: closes gaps.
-const SEEN_CELL: f32 = 2.5;
-/// Depth in a cell up to which points are seen, metres: cloth against the light, and noise.
-const SEEN_DEPTH: f32 = 0.03;
-/// Least sum of the cosines to the directions from which a point is seen: one, straight.
-const LEAST_FACING: f32 = 1.0;
-/// Share of the points from which signs are told.
-const MOST_KNOWN: f64 = 0.8;
-
 /// Edges between near points of a cloud, the lower index first, each once: those of the wanted points.
-pub(super) fn neighbour_edges(points: &[P3], is_wanted: impl Fn(usize) -> bool) -> Vec<[u32; 2]> {
-    let (most, multiple) = BESIDE;
-    let reach = multiple * mean_spacing(points);
+pub(super) fn neighbour_edges(
+    points: &[P3],
+    settings: &CloudSettings,
+    is_wanted: impl Fn(usize) -> bool,
+) -> Vec<[u32; 2]> {
+    let reach = settings.edge * mean_spacing(points);
     let near = Neighbours::new(points, reach);
     let mut out = Vec::new();
+    let mut nearest = vec![(f32::INFINITY, u32::MAX); settings.edges];
     for i in (0..points.len() as u32).filter(|i| is_wanted(*i as usize)) {
-        let mut nearest = [(f32::INFINITY, u32::MAX); BESIDE.0];
+        nearest.fill((f32::INFINITY, u32::MAX));
         near.each(i, reach, |j, square| {
             let is_known = j == i || nearest.iter().any(|n| n.1 == j);
-            if !is_known && (square, j) < nearest[most - 1] {
+            if !is_known && (square, j) < nearest[settings.edges - 1] {
                 let at = nearest.partition_point(|n| *n < (square, j));
                 nearest[at..].rotate_right(1);
                 nearest[at] = (square, j);
@@ -59,30 +41,22 @@ pub(super) fn spatial_order(points: &[P3]) -> Vec<u32> {
     const CELL: f32 = 0.002;
     let spread = |v: f32| {
         let mut bits = ((v / CELL).floor() as i32 & 1023) as u32;
-        for (shift, mask) in [
-            (16, 0x0300_00FF),
-            (8, 0x0300_F00F),
-            (4, 0x030C_30C3),
-            (2, 0x0924_9249),
-        ] {
-            bits = (bits | (bits << shift)) & mask;
-        }
-        u64::from(bits)
+        bits = (bits | (bits << 16)) & 0x0300_00FF;
+        bits = (bits | (bits << 8)) & 0x0300_F00F;
+        bits = (bits | (bits << 4)) & 0x030C_30C3;
+        u64::from((bits | (bits << 2)) & 0x0924_9249)
     };
     let code = |p: &P3| spread(p.x) | (spread(p.y) << 1) | (spread(p.z) << 2);
-    let coded = points
-        .iter()
-        .enumerate()
-        .map(|(i, p)| (code(p) << 32) | i as u64);
+    let coded = (0..).zip(points).map(|(i, p)| (code(p) << 32) | i);
     let mut coded: Vec<u64> = coded.collect();
     coded.sort_unstable();
     coded.iter().map(|c| *c as u32).collect()
 }
 
 /// Points of small pieces apart from the rest: pixels between surfaces, remains of a floor. Shape `[points]`.
-pub(super) fn are_strays(points: &[P3]) -> Vec<bool> {
-    let reach = LINK * mean_spacing(points);
-    let most = (STRAY * points.len() as f64) as usize;
+pub(super) fn are_strays(points: &[P3], settings: &CloudSettings) -> Vec<bool> {
+    let reach = settings.link * mean_spacing(points);
+    let most = (settings.stray * points.len() as f64) as usize;
     let near = Neighbours::new(points, reach);
     let mut seen = vec![false; points.len()];
     let mut strays = seen.clone();
@@ -110,10 +84,12 @@ pub(super) fn are_strays(points: &[P3]) -> Vec<bool> {
 /// Normal of the plane through each point and its neighbours, of either sign; zero with fewer than three.
 ///
 /// Few neighbours follow the surface, but noise as large as their distances leaves no plane through them: then more.
-pub(super) fn plane_normals(points: &[P3]) -> Vec<V3> {
-    let reach = REACH * mean_spacing(points);
-    let widest = |k: usize| (k as f32 / NEIGHBOURS[0] as f32).sqrt() * reach;
-    let grids = NEIGHBOURS.map(|k| (k, widest(k), Neighbours::new(points, widest(k))));
+pub(super) fn plane_normals(points: &[P3], settings: &CloudSettings) -> Vec<V3> {
+    let reach = settings.reach * mean_spacing(points);
+    let fewest = settings.neighbours[0] as f32;
+    let widest = |k: usize| (k as f32 / fewest).sqrt() * reach;
+    let grid = |k| (k, widest(k), Neighbours::new(points, widest(k)));
+    let grids = settings.neighbours.map(grid);
     let normal = |i: usize| {
         let mut best = (f64::INFINITY, V3::zeros());
         for (k, reach, grid) in &grids {
@@ -122,7 +98,7 @@ pub(super) fn plane_normals(points: &[P3]) -> Vec<V3> {
             if let Some(found) = plane(points, &near).filter(|f| f.0 < best.0) {
                 best = found;
             }
-            if best.0 < FLAT {
+            if best.0 < settings.flat {
                 break;
             }
         }
@@ -137,35 +113,37 @@ pub(super) fn plane_normals(points: &[P3]) -> Vec<V3> {
 /// then of either sign as before. Shapes `[points]`.
 ///
 /// A point that is not seen, or as well from behind, gets no normal.
-pub(super) fn turn_outwards(points: &[P3], normals: &mut [V3]) -> bool {
-    let side = SEEN_CELL * mean_spacing(points);
+pub(super) fn turn_outwards(points: &[P3], normals: &mut [V3], settings: &CloudSettings) -> bool {
+    /// Angle about the vertical from one direction to the next, radians: the golden one.
+    const GOLDEN: f32 = 2.399_963;
+    let side = settings.seen_cell * mean_spacing(points);
     let mut toward = vec![V3::zeros(); points.len()];
-    for k in 0..DIRECTIONS {
+    for k in 0..settings.directions {
         // Evenly over the sphere, along a spiral.
-        let up = (2 * k + 1) as f32 / DIRECTIONS as f32 - 1.0;
+        let up = (2 * k + 1) as f32 / settings.directions as f32 - 1.0;
         let (sin, cos) = (k as f32 * GOLDEN).sin_cos();
         let flat = (1.0 - up * up).sqrt();
         let direction = V3::new(flat * cos, up, flat * sin);
         let x = V3::new(-sin, 0.0, cos);
         let y = direction.cross(&x);
         let cell = |p: &P3| [x, y].map(|axis| (axis.dot(&p.coords) / side).floor() as i32);
-        let mut nearest = std::collections::HashMap::new();
+        let mut nearest = HashMap::new();
         for p in points {
             let height = direction.dot(&p.coords);
             let top = nearest.entry(cell(p)).or_insert(height);
             *top = top.max(height);
         }
         for (toward, p) in toward.iter_mut().zip(points) {
-            if direction.dot(&p.coords) > nearest[&cell(p)] - SEEN_DEPTH {
+            if direction.dot(&p.coords) > nearest[&cell(p)] - settings.seen_depth {
                 *toward += direction;
             }
         }
     }
     let facing = |(n, t): (&V3, &V3)| n.dot(t);
-    let is_known = |n: &f32| n.abs() > LEAST_FACING;
+    let is_known = |n: &f32| n.abs() > settings.least_facing;
     let along: Vec<f32> = normals.iter().zip(&toward).map(facing).collect();
     let known = along.iter().filter(|n| is_known(n)).count();
-    if (known as f64) < MOST_KNOWN * points.len() as f64 {
+    if (known as f64) < settings.most_known * points.len() as f64 {
         return false;
     }
     for (n, along) in normals.iter_mut().zip(&along) {
@@ -181,10 +159,8 @@ fn plane(points: &[P3], some: &[u32]) -> Option<(f64, V3)> {
     }
     let at = |i: &u32| points[*i as usize].coords.cast::<f64>();
     let mean = some.iter().map(at).sum::<Vector3<f64>>() / some.len() as f64;
-    let scatter: Matrix3<f64> = (some.iter())
-        .map(|i| at(i) - mean)
-        .map(|d| d * d.transpose())
-        .sum();
+    let from_mean = some.iter().map(|i| at(i) - mean);
+    let scatter: Matrix3<f64> = from_mean.map(|d| d * d.transpose()).sum();
     let eigen = scatter.symmetric_eigen();
     let across = eigen.eigenvalues.imin();
     let normal = eigen.eigenvectors.column(across).into_owned().cast();
@@ -228,10 +204,8 @@ impl<'a> Neighbours<'a> {
 /// Typical distance between neighbouring points of a surface, metres: by the number of occupied cells of 3 cm.
 pub(super) fn mean_spacing(points: &[P3]) -> f32 {
     const CELL: f32 = 0.03;
-    let cells: std::collections::HashSet<[i32; 3]> = points
-        .iter()
-        .map(|p| [p.x, p.y, p.z].map(|v| (v / CELL).floor() as i32))
-        .collect();
+    let cell = |p: &P3| [p.x, p.y, p.z].map(|v| (v / CELL).floor() as i32);
+    let cells: HashSet<[i32; 3]> = points.iter().map(cell).collect();
     // A surface crosses about 1.5 cells for each square of a cell's side.
     let area = cells.len() as f32 * CELL * CELL / 1.5;
     (area / points.len().max(1) as f32).sqrt()
@@ -254,7 +228,7 @@ mod tests {
     #[test]
     fn normals_pass_over_the_distance_of_two_sheets() {
         let points = sheets();
-        let normals = plane_normals(&points);
+        let normals = plane_normals(&points, &CloudSettings::default());
         let across = normals.iter().filter(|n| n.y.abs() > 0.9).count();
         assert!(across * 100 > points.len() * 98, "{across}");
     }
@@ -276,26 +250,22 @@ mod tests {
 
     #[test]
     fn edges_of_wanted_points_are_those_of_all_that_touch_them() {
-        let points = sheets();
-        let all = neighbour_edges(&points, |_| true);
-        let some = neighbour_edges(&points, |i| i < 5000);
+        let (points, settings) = (sheets(), CloudSettings::default());
+        let all = neighbour_edges(&points, &settings, |_| true);
+        let some = neighbour_edges(&points, &settings, |i| i < 5000);
         assert!(some.iter().all(|e| all.binary_search(e).is_ok()));
         let inner = |e: &&[u32; 2]| e.iter().all(|v| *v < 5000);
-        assert_eq!(
-            all.iter().filter(inner).count(),
-            some.iter().filter(inner).count()
-        );
+        assert!(all.iter().filter(inner).eq(some.iter().filter(inner)));
     }
 
     #[test]
     fn small_pieces_apart_are_strays() {
-        let mut points = sheets();
+        let (mut points, settings) = (sheets(), CloudSettings::default());
         let count = points.len();
-        points.push(P3::new(0.5, 0.3, 0.5));
-        points.push(P3::new(0.5, 0.301, 0.5));
-        let strays = are_strays(&points);
+        points.extend([0.3, 0.301].map(|y| P3::new(0.5, y, 0.5)));
+        let strays = are_strays(&points, &settings);
         assert_eq!(strays.iter().filter(|s| **s).count(), 2);
         assert!(strays[count] && strays[count + 1]);
-        assert!(!are_strays(&sheets()).contains(&true));
+        assert!(!are_strays(&sheets(), &settings).contains(&true));
     }
 }

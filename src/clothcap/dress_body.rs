@@ -5,10 +5,11 @@ use super::archive::FrameDisplacements;
 use super::layers::clear_body;
 use super::multi::MultiCloth;
 use super::retarget::{PenetrationSolver, RetargetReport, SolidBody, on_body};
+use super::settings::PenetrationSettings;
 use super::topology::ClothTemplate;
 use std::sync::Arc;
 use tryon_body::{ArmClearance, BoneTransforms, Pose, PosedSkin, RestBody, Template};
-use tryon_geometry::math::{P3, V3, World};
+use tryon_geometry::math::{P3, World};
 use tryon_geometry::par::Par;
 
 /// Dressed body in one pose.
@@ -42,14 +43,11 @@ impl<'a> BodyDresser<'a> {
     /// # Errors
     /// [`CaptureError::Solve`] for a garment too large, [`CaptureError::Topology`] for a body without legs under a skirt.
     pub fn new(template: Arc<Template>, cloth: &'a MultiCloth) -> Result<Self, CaptureError> {
+        let solvers = cloth.parts.iter().map(PenetrationSolver::new);
         Ok(Self {
             surface: ClothTemplate::new(&template, cloth.legs)?,
-            solid: SolidBody::new(&template)?,
-            solvers: cloth
-                .parts
-                .iter()
-                .map(PenetrationSolver::new)
-                .collect::<Result<_, _>>()?,
+            solid: SolidBody::new(&template, PenetrationSettings::default())?,
+            solvers: solvers.collect::<Result<_, _>>()?,
             template,
             cloth,
         })
@@ -96,18 +94,12 @@ impl<'a> BodyDresser<'a> {
         pose: &Pose<World>,
     ) -> Result<DressedPose, CaptureError> {
         self.check(target, displacements)?;
-        let moved = |(p, d): (&P3, &V3)| p + d;
-        let rest: Vec<P3> = target
-            .vertices
-            .iter()
-            .zip(&displacements.body)
-            .map(moved)
-            .collect();
+        let rest = target.vertices.iter().zip(&displacements.body);
+        let rest: Vec<P3> = rest.map(|(p, d)| p + d).collect();
         let mut bones = BoneTransforms::default();
         pose.bones(self.template.skeleton(), target, &mut bones);
-        let mut body = Vec::new();
-        self.template
-            .pose_vertices(Par::Rayon, &rest, &bones, &mut body);
+        let (mut body, template) = (Vec::new(), &self.template);
+        template.pose_vertices(Par::Rayon, &rest, &bones, &mut body);
         self.solid.place(&body)?;
         let rest = self.surface.extend(&rest);
         let skin = PosedSkin::new(self.surface.template(), &bones);
@@ -127,37 +119,22 @@ impl<'a> BodyDresser<'a> {
         })
     }
 
+    /// Checks that body and displacements belong to the template and the outfit.
     fn check(
         &self,
         target: &RestBody,
         displacements: &FrameDisplacements,
     ) -> Result<(), CaptureError> {
-        let fault = |why: String| Err(CaptureError::Displacements { why });
-        let n = self.template.mesh().vertices().len();
-        if target.vertices.len() != n || displacements.body.len() != n {
-            return fault(format!(
-                "{} body vertices and {} displacements, the template has {n}",
-                target.vertices.len(),
-                displacements.body.len()
-            ));
+        let garments = displacements.garments.iter().map(Vec::len);
+        let got = [target.vertices.len(), displacements.body.len()].into_iter();
+        let got: Vec<usize> = got.chain(garments).collect();
+        let parts = self.cloth.parts.iter().map(|p| p.nodes.len());
+        let body = self.template.mesh().vertices().len();
+        let wanted: Vec<usize> = [body; 2].into_iter().chain(parts).collect();
+        if got == wanted {
+            return Ok(());
         }
-        let parts = &self.cloth.parts;
-        if displacements.garments.len() != parts.len() {
-            return fault(format!(
-                "{} garments, the outfit has {}",
-                displacements.garments.len(),
-                parts.len()
-            ));
-        }
-        let sizes = parts.iter().zip(&displacements.garments).enumerate();
-        for (k, (part, d)) in sizes {
-            if part.nodes.len() != d.len() {
-                let (got, want) = (d.len(), part.nodes.len());
-                return fault(format!(
-                    "garment {k}: {got} displacements, it has {want} vertices"
-                ));
-            }
-        }
-        Ok(())
+        let why = format!("body, its displacements, garments: {got:?} vertices, not {wanted:?}");
+        Err(CaptureError::Displacements { why })
     }
 }

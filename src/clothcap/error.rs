@@ -1,6 +1,6 @@
 //! Error of a capture, and the frame, part or field at fault.
 
-/// BodyScan or sequence that yields no garment.
+/// Scan or sequence that yields no garment.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum CaptureError {
     /// Too few finite points.
@@ -46,4 +46,12 @@ pub enum CaptureError {
         /// Fault of the solver.
         why: String,
     },
+}
+
+impl CaptureError {
+    /// Fault of a solver in a stage.
+    pub(crate) fn solve(stage: &'static str, why: impl std::fmt::Display) -> Self {
+        let why = why.to_string();
+        Self::Solve { stage, why }
+    }
 }

@@ -5,14 +5,8 @@ use super::multi::MultiCloth;
 use super::retarget::{PenetrationSolver, RetargetReport, SolidBody};
 use tryon_geometry::math::P3;
 
-/// Place of a hidden vertex between skin and the garment above, 0 to 1.
-const DEPTH: f32 = 0.5;
-
 /// Moves posed garments out of a body: those seen with the least change of edges, then hidden vertices below the garments
 /// above them. A garment that is free keeps its bits. Shape `[garments][vertices]`, metres.
-///
-/// # Errors
-/// [`CaptureError::Solve`].
 pub(super) fn clear_body(
     cloth: &MultiCloth,
     solvers: &mut [PenetrationSolver],
@@ -32,22 +26,20 @@ pub(super) fn clear_body(
     Ok(reports)
 }
 
-/// Moves hidden vertices below the garments above them. Shapes `[garments][vertices]` and `[body vertices]`, metres.
+/// Moves hidden vertices halfway below the garments above them. Shapes `[garments][vertices]` and `[body vertices]`, metres.
 fn tuck_hidden(cloth: &MultiCloth, garments: &mut [Vec<P3>], body: &[P3]) {
-    for inner in 0..cloth.parts.len() {
-        for (i, node) in cloth.parts[inner].nodes.iter().enumerate() {
-            if !cloth.parts[inner].hidden[i] {
-                continue;
-            }
+    for (inner, part) in cloth.parts.iter().enumerate() {
+        let hidden = part.nodes.iter().enumerate();
+        for (i, node) in hidden.filter(|(i, _)| part.hidden[*i]) {
             let above = cloth.parts.iter().enumerate().filter(|(k, _)| *k != inner);
             let above = above.filter_map(|(k, part)| {
                 let at = part.nodes.binary_search(node).ok()?;
                 (!part.hidden[at]).then(|| garments[k][at])
             });
-            let skin = body[cloth.parts[inner].below[i] as usize];
+            let skin = body[part.below[i] as usize];
             let nearest = above.min_by(|a, b| (a - skin).norm().total_cmp(&(b - skin).norm()));
             if let Some(p) = nearest {
-                garments[inner][i] = skin + (p - skin) * DEPTH;
+                garments[inner][i] = skin + (p - skin) * 0.5;
             }
         }
     }

@@ -1,39 +1,19 @@
 //! Garments from scans: alignment, segmentation, multi-part templates, undressing, retargeting.
 //!
-//! # Ideas
+//! Stages, each in the folder or file of its name:
 //!
-//! - Units, axes, normals: [`mod@scan`].
-//! - From one camera: key frames [`mod@turn::key_frames`], points of a frame [`mod@turn::frame_points`], one pose for
-//!   all [`mod@turn::fused_cloud`], joint registration [`mod@turn::multi_view`].
-//! - What no scan point shows: [`mod@segment::unseen`].
-//! - Start from virtual depth cameras: [`mod@align::start`], [`mod@virtual_camera`], [`tryon_tracking::still`].
-//! - Body model to scan (eq. 3, 6, 7): [`mod@align::model_fit`].
-//! - A surface pulled to points, the same for the fits below: [`mod@align::surface_fit`], its linear system
-//!   [`mod@align::quadratic`], its pairs [`mod@align::scan_pairing`].
-//! - Free surface (eq. 4, 5): [`mod@align::free_surface`].
-//! - Sequences (eq. 9, 10): [`mod@align::aligner`].
-//! - Surfaces of skirts and dresses: [`mod@topology`].
-//! - Told from trousers in [`mod@align::legs`].
-//! - Unposing (eq. 8): [`tryon_body::PosedSkin`].
-//! - Colours (eq. 13): [`mod@segment::color_mixture`].
-//! - Prior (figure 4): [`mod@segment::prior`].
-//! - Labels (eq. 11, 12): [`mod@segment::labelling`].
-//! - Number and kinds of garments: [`mod@segment::outfit`].
-//! - Two on the torso: [`mod@segment::torso`].
-//! - Labels of the scan: [`mod@segment::scan_labels`].
-//! - Alpha expansion, maximum flow (eq. 14): [`mod@tryon_geometry::mrf`].
-//! - Parts and rings: [`mod@multi::part`].
-//! - Their fit (eq. 15 to 21): [`mod@multi::part_fit`].
-//! - One shape from several scans (section 5.4): [`mod@align::shared_shape`], [`mod@align::body_equations`].
-//! - Body under the cloth (eq. 22): [`mod@undress`].
-//! - Hidden layers: [`mod@layers`].
-//! - Other bodies (eq. 23 to 25): [`mod@dress_body`].
-//! - Out of the body: [`mod@retarget`].
-//! - A population: [`mod@population`].
-//! - Texture: charts [`mod@texture::charts`], their image [`mod@texture::atlas`], its colours [`mod@texture::paint`],
-//!   on the worn garment `src/mirror/captured.rs`.
-//! - Files of a capture, resumed: [`mod@archive`].
-//! - Captured parts as cloth to wear: [`mod@multi::trim`].
+//! - [`mod@scan`]: units, axes, normals. [`mod@turn`]: one scan from the frames of one camera.
+//! - [`mod@align`] (section 5.1): person in virtual cameras, body model (eq. 3, 6, 7, 9, 10), free surface (eq. 4, 5), all on
+//!   one kind of surface pulled to points, [`mod@align::surface_fit`], and one sparse system, [`mod@align::quadratic`].
+//! - [`mod@topology`]: surfaces of skirts and dresses; [`mod@align::legs`] tells them from trousers.
+//! - [`mod@segment`] (section 5.2): appearances (eq. 13), prior (figure 4), labels of template and scan (eq. 11, 12, 14 by
+//!   [`mod@tryon_geometry::mrf`]), number and kinds of garments, unseen parts.
+//! - [`mod@multi`] (section 5.3): parts, rings, their fit (eq. 15 to 21), captured parts as cloth to wear.
+//! - [`mod@undress`] (section 5.4): one shape from several scans, [`mod@align::shared_shape`], body under the cloth (eq. 22).
+//! - [`mod@dress_body`] (eq. 23 to 25), out of the body by [`mod@retarget`], hidden layers by [`mod@layers`],
+//!   [`mod@population`].
+//! - [`mod@texture`]: charts, their image, its colours. [`mod@archive`]: files of a capture, resumed.
+//! - [`mod@settings`]: a struct a stage.
 #![allow(rustdoc::private_intra_doc_links)] // the index of ideas names private modules
 
 pub mod align;
@@ -43,6 +23,7 @@ mod capture;
 mod capture_header;
 mod captured_outfit;
 mod cloud;
+mod dense_equations;
 mod dress_body;
 mod error;
 mod floor;
@@ -57,6 +38,7 @@ mod scalp;
 pub mod scan;
 pub mod segment;
 mod segmenter;
+pub mod settings;
 #[cfg(test)]
 mod test_scans;
 #[cfg(test)]
@@ -65,9 +47,8 @@ pub mod texture;
 pub mod topology;
 pub mod turn;
 mod undress;
-mod virtual_camera;
 
-pub use capture::{CaptureConfig, FrameCapture, FrameReport, OutfitCapture};
+pub use capture::{FrameCapture, FrameReport, OutfitCapture, OutfitCaptureConfig};
 pub use captured_outfit::CapturedOutfit;
 pub use dress_body::{BodyDresser, DressedPose};
 pub use error::CaptureError;

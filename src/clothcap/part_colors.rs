@@ -5,14 +5,12 @@ use super::scan::BodyScan;
 use super::segmenter::SegmentedScan;
 use tryon_geometry::mesh::{Csr, edges};
 
-/// Colour of a garment without a coloured point, sRGB.
-const GREY: f32 = 160.0;
-
-/// Colours of a part's vertices, sRGB, shape `[vertices]`.
+/// Colours of a part's vertices, sRGB, shape `[vertices]`; `grey` without a coloured point.
 pub(super) fn part_colors(
     part: &ClothPart,
     segmented: &SegmentedScan,
     scan: &BodyScan,
+    grey: f32,
 ) -> Vec<[u8; 3]> {
     let around = Csr::of_edges(part.nodes.len(), &edges(&part.faces));
     let own = |(v, hidden): (&u32, &bool)| {
@@ -43,7 +41,7 @@ pub(super) fn part_colors(
             break;
         }
     }
-    let rounded = |c: &Option<[f32; 3]>| c.unwrap_or([GREY; 3]).map(|v| v.round() as u8);
+    let rounded = |c: &Option<[f32; 3]>| c.unwrap_or([grey; 3]).map(|v| v.round() as u8);
     known.iter().map(rounded).collect()
 }
 

@@ -1,21 +1,17 @@
 //! Fit of all garments of an outfit to one segmented scan.
 
 use super::CaptureError;
-use super::align::{AlignedBody, QueryCounts, SETTLED, STILL, VertexCounts};
+use super::align::{AlignedBody, QueryCounts, VertexCounts};
 use super::captured_outfit::CapturedOutfit;
-use super::multi::{ClothPart, MultiCloth, PartFit, PartFitConfig, PartScan};
+use super::multi::{ClothPart, LabelledScan, MultiCloth, PartFit, PartScan};
 use super::part_colors::part_colors;
 use super::scan::BodyScan;
 use super::segmenter::SegmentedScan;
+use super::settings::{PartFitConfig, TextureSettings};
 use super::texture::TextureAtlas;
 use super::topology::ClothTemplate;
 use tryon_body::{BoneTransforms, PosedSkin};
 use tryon_geometry::math::P3;
-
-/// Side of a texel over the distance between the scan's colours, and its limits, metres.
-const TEXEL: f32 = 0.5;
-/// See [`TEXEL`].
-const TEXELS: [f32; 2] = [0.001, 0.004];
 
 /// Garments on one scan.
 #[derive(Debug, Default)]
@@ -33,38 +29,17 @@ pub(super) struct FittedParts {
 /// Fit of all parts to one segmented scan.
 pub(super) struct PartFitter<'a> {
     /// Systems of the garments so far.
-    fits: &'a mut Vec<PartFit>,
-    cloth: &'a ClothTemplate,
-    scan: &'a BodyScan,
-    segmented: &'a SegmentedScan,
+    pub(super) fits: &'a mut Vec<PartFit>,
+    pub(super) cloth: &'a ClothTemplate,
+    pub(super) scan: &'a BodyScan,
+    pub(super) segmented: &'a SegmentedScan,
     /// Vertex of the clothed template that each scan point lies near, shape `[points]`.
-    near: Vec<u32>,
-    config: PartFitConfig,
+    pub(super) near: &'a [u32],
+    pub(super) config: PartFitConfig,
+    pub(super) texture: &'a TextureSettings,
 }
 
-impl<'a> PartFitter<'a> {
-    /// Fitter of one scan; `fits` are the systems of the garments so far. With skips, settled points and vertices are held.
-    pub(super) fn new(
-        fits: &'a mut Vec<PartFit>,
-        cloth: &'a ClothTemplate,
-        (scan, segmented): (&'a BodyScan, &'a SegmentedScan),
-        (config, skips): (&PartFitConfig, bool),
-    ) -> Self {
-        let [settled, still] = if skips { [SETTLED, STILL] } else { [0.0; 2] };
-        Self {
-            fits,
-            cloth,
-            scan,
-            segmented,
-            near: nearest_nodes(segmented, cloth),
-            config: PartFitConfig {
-                settled,
-                still,
-                ..*config
-            },
-        }
-    }
-
+impl PartFitter<'_> {
     /// Parts of the first scan, coupled to the body model (eq. 18), and the outfit that they make.
     pub(super) fn first(
         &mut self,
@@ -78,27 +53,22 @@ impl<'a> PartFitter<'a> {
         let alignment = &segmented.alignment;
         let mut fitted = FittedParts::default();
         for part in &cloth.parts {
-            let pick = |v: &[P3]| {
-                part.nodes
-                    .iter()
-                    .map(|i| v[*i as usize])
-                    .collect::<Vec<_>>()
-            };
+            let nodes = part.nodes.iter();
+            let pick = |v: &[P3]| nodes.clone().map(|i| v[*i as usize]).collect::<Vec<_>>();
             let model = pick(&alignment.model);
             self.fit(part, &model, pick(&alignment.surface), &mut fitted)?;
         }
         let parts = cloth.parts.iter().zip(&fitted.vertices);
         let rest = parts.map(|(part, v)| rest(self.cloth, &alignment.bones, part, v));
-        let colors = cloth
-            .parts
-            .iter()
-            .map(|part| part_colors(part, segmented, segmented.evened(self.scan)));
+        let evened = segmented.evened(self.scan);
+        let grey = self.texture.grey;
+        let colors = cloth.parts.iter();
+        let colors = colors.map(|part| part_colors(part, segmented, evened, grey));
         let rest: Vec<Vec<P3>> = rest.collect();
-        let texel = TEXEL * self.scan.color_spacing();
+        let [least, most] = self.texture.texels;
+        let texel = (self.texture.texel * self.scan.color_spacing()).clamp(least, most);
         let atlases = cloth.parts.iter().zip(&rest);
-        let atlases = atlases.map(|(part, rest)| {
-            TextureAtlas::new(rest, &part.faces, texel.clamp(TEXELS[0], TEXELS[1]))
-        });
+        let atlases = atlases.map(|(part, rest)| TextureAtlas::new(rest, &part.faces, texel));
         let is_colored = !self.scan.colors.is_empty();
         let outfit = CapturedOutfit {
             atlases: atlases.filter(|_| is_colored).collect(),
@@ -131,11 +101,13 @@ impl<'a> PartFitter<'a> {
         out: &mut FittedParts,
     ) -> Result<(), CaptureError> {
         let segmented = self.segmented;
-        let points = PartScan::new(
-            (self.scan, &segmented.edges),
-            (&segmented.labels, &self.near),
-            part.label,
-        );
+        let labelled = LabelledScan {
+            scan: self.scan,
+            edges: &segmented.edges,
+            labels: &segmented.labels,
+            near: self.near,
+        };
+        let points = PartScan::new(&labelled, part.label, self.config.beside);
         let mut vertices = start;
         let k = out.vertices.len();
         if k == self.fits.len() {
@@ -152,15 +124,6 @@ impl<'a> PartFitter<'a> {
         out.vertex_counts += report.surface.vertices;
         Ok(())
     }
-}
-
-/// Vertex of the clothed template nearest to each scan point on the single mesh, shape `[points]`.
-fn nearest_nodes(segmented: &SegmentedScan, cloth: &ClothTemplate) -> Vec<u32> {
-    let faces = cloth.template().mesh().faces();
-    let matches = segmented.alignment.matches.iter();
-    matches
-        .map(|m| faces[m.face as usize][m.nearest_corner()])
-        .collect()
 }
 
 /// Rest vertices of a part from posed ones (eq. 15), metres.

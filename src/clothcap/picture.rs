@@ -3,30 +3,16 @@
 use super::capture::FrameCapture;
 use super::captured_outfit::CapturedOutfit;
 use super::scan::BodyScan;
+use super::settings::PictureSettings;
 use super::texture::{GarmentTexture, TextureAtlas};
 use super::topology::ClothTemplate;
 use nalgebra::{Rotation3, Vector3};
 use tryon_body::Pose;
 use tryon_geometry::camera::ColorImage;
 use tryon_geometry::math::{P3, V3, World};
-use tryon_geometry::mesh::Face;
+use tryon_geometry::mesh::{Csr, Face, vertex_normals};
 use tryon_geometry::par::Par;
 use tryon_geometry::raster::{Options, View, VisibilityBuffer, interpolate, rasterise_with};
-
-/// Scale, pixels a metre.
-const SCALE: f32 = 300.0;
-/// Width and height of a panel, metres.
-const PANEL: [f32; 2] = [1.3, 2.0];
-/// Height of the panel's lower rim over the lowest vertex, metres.
-const BELOW: f32 = 0.06;
-/// Background, sRGB.
-const PAPER: [u8; 3] = [245, 245, 245];
-/// Direction of the light in the picture: from the left above, behind the viewer.
-const LIGHT: [f32; 3] = [-0.4, 0.6, 0.7];
-/// Brightness without direct light.
-const AMBIENT: f32 = 0.35;
-/// Side of a point of a cloud, pixels.
-const DOT: i32 = 2;
 
 /// Coloured mesh, or cloud if it has no faces.
 #[derive(Clone, Copy, Debug)]
@@ -50,10 +36,18 @@ impl<'a> Painted<'a> {
         points: &'a [P3],
     ) -> Self {
         Self {
-            points,
-            faces: &outfit.cloth.parts[k].faces,
-            colors: &outfit.colors[k],
             texture: outfit.atlases.get(k).zip(textures.get(k)),
+            ..Self::colored(points, &outfit.cloth.parts[k].faces, &outfit.colors[k])
+        }
+    }
+
+    /// Mesh in colours of its points.
+    pub fn colored(points: &'a [P3], faces: &'a [Face], colors: &'a [[u8; 3]]) -> Self {
+        Self {
+            points,
+            faces,
+            colors,
+            texture: None,
         }
     }
 
@@ -79,7 +73,7 @@ pub struct PicturePanel<'a> {
 }
 
 /// Colours of parts, sRGB: skin, then garments.
-pub const PART_COLORS: [[u8; 3]; 7] = [
+const PART_COLORS: [[u8; 3]; 7] = [
     [230, 190, 160],
     [70, 110, 200],
     [225, 215, 90],
@@ -88,9 +82,6 @@ pub const PART_COLORS: [[u8; 3]; 7] = [
     [170, 90, 190],
     [90, 190, 200],
 ];
-/// Directions of a stage: front, side, back, radians about the vertical from the body's front.
-const VIEWS: [f32; 3] = [0.0, 1.2, std::f32::consts::PI];
-
 /// Colour of a part.
 pub fn part_color(part: u8) -> [u8; 3] {
     PART_COLORS[usize::from(part) % PART_COLORS.len()]
@@ -111,33 +102,14 @@ pub fn stages(
     let grey = vec![[190, 190, 200]; surface.vertices().len()];
     let labels: Vec<[u8; 3]> = frame.labels.iter().map(|p| part_color(*p)).collect();
     let plain = vec![[160; 3]; scan.points.len()];
-    let of_scan = |colors| Painted {
-        points: &scan.points,
-        faces: &scan.faces,
-        colors,
-        texture: None,
-    };
-    let captured = if scan.colors.is_empty() {
-        &plain
-    } else {
-        &scan.colors
-    };
-    let body = Painted {
-        points: &frame.undressed.vertices,
-        faces: skin_mesh.faces(),
-        colors: &skin,
-        texture: None,
-    };
+    let of_scan = |colors| Painted::colored(&scan.points, &scan.faces, colors);
+    let is_plain = scan.colors.is_empty();
+    let captured = if is_plain { &plain } else { &scan.colors };
+    let body = Painted::colored(&frame.undressed.vertices, skin_mesh.faces(), &skin);
     let garments = frame.garments.iter().enumerate();
-    let garments: Vec<Painted<'_>> = garments
-        .map(|(k, points)| Painted::garment(outfit, textures, k, points))
-        .collect();
-    let aligned = Painted {
-        points: &frame.alignment.surface,
-        faces: surface.faces(),
-        colors: &grey,
-        texture: None,
-    };
+    let garments = garments.map(|(k, points)| Painted::garment(outfit, textures, k, points));
+    let garments: Vec<Painted<'_>> = garments.collect();
+    let aligned = Painted::colored(&frame.alignment.surface, surface.faces(), &grey);
     let dressed = [&[body][..], &garments].concat();
     let columns = [
         vec![of_scan(captured)],
@@ -147,16 +119,14 @@ pub fn stages(
         vec![body],
         dressed,
     ];
-    let panels: Vec<PicturePanel<'_>> = VIEWS
-        .iter()
-        .flat_map(|view| {
-            columns.iter().map(move |meshes| PicturePanel {
-                meshes: meshes.clone(),
-                yaw: front + view,
-            })
+    let views = PictureSettings::default().views;
+    let panels = views.iter().flat_map(|view| {
+        columns.iter().map(move |meshes| PicturePanel {
+            meshes: meshes.clone(),
+            yaw: front + view,
         })
-        .collect();
-    sheet(&panels, columns.len())
+    });
+    sheet(&panels.collect::<Vec<_>>(), columns.len())
 }
 
 /// Direction that a body faces, radians about the vertical from +z.
@@ -168,13 +138,14 @@ pub fn heading(pose: &Pose<World>) -> f32 {
 /// Draws panels side by side, `columns` a row.
 pub fn sheet(panels: &[PicturePanel<'_>], columns: usize) -> ColorImage {
     let columns = columns.clamp(1, panels.len().max(1));
-    let [w, h] = PANEL.map(|m| (m * SCALE) as u32);
+    let settings = PictureSettings::default();
+    let [w, h] = settings.panel.map(|m| (m * settings.scale) as u32);
     let rows = panels.len().div_ceil(columns) as u32;
-    let mut out = ColorImage::filled(w * columns as u32, h * rows, PAPER);
+    let mut out = ColorImage::filled(w * columns as u32, h * rows, settings.paper);
     let stride = out.width() as usize;
     for (k, panel) in panels.iter().enumerate() {
         let (column, row) = (k % columns, k / columns);
-        let picture = draw(panel, [w, h]);
+        let picture = draw(panel, [w, h], &settings);
         for y in 0..h as usize {
             let from = 3 * y * w as usize;
             let to = 3 * ((row * h as usize + y) * stride + column * w as usize);
@@ -186,7 +157,7 @@ pub fn sheet(panels: &[PicturePanel<'_>], columns: usize) -> ColorImage {
 }
 
 /// Rows of one panel.
-fn draw(panel: &PicturePanel<'_>, [w, h]: [u32; 2]) -> Vec<u8> {
+fn draw(panel: &PicturePanel<'_>, [w, h]: [u32; 2], settings: &PictureSettings) -> Vec<u8> {
     let turn = Rotation3::from_axis_angle(&V3::y_axis(), -panel.yaw);
     let finite = |p: &&P3| p.iter().all(|c| c.is_finite());
     let all = || panel.meshes.iter().flat_map(|m| m.points).filter(finite);
@@ -196,21 +167,18 @@ fn draw(panel: &PicturePanel<'_>, [w, h]: [u32; 2]) -> Vec<u8> {
     let view = View::Orthographic {
         width: w,
         height: h,
-        left: middle.x - 0.5 * PANEL[0],
-        top: -(low - BELOW + PANEL[1]),
-        pixels_per_metre: SCALE,
+        left: middle.x - 0.5 * settings.panel[0],
+        top: -(low - settings.below + settings.panel[1]),
+        pixels_per_metre: settings.scale,
     };
-    let mut pixels: Vec<u8> = PAPER.repeat((w * h) as usize);
+    let mut pixels: Vec<u8> = settings.paper.repeat((w * h) as usize);
     let mut depth = vec![f32::INFINITY; (w * h) as usize];
     for mesh in &panel.meshes {
         // The viewer's axes: x right, y down, z away.
-        let seen: Vec<P3> = mesh
-            .points
-            .iter()
-            .map(|p| turn * p)
-            .map(|q| P3::new(q.x, -q.y, -q.z))
-            .collect();
+        let seen = mesh.points.iter().map(|p| turn * p);
+        let seen: Vec<P3> = seen.map(|q| P3::new(q.x, -q.y, -q.z)).collect();
         let mut target = Target {
+            settings,
             view: &view,
             pixels: &mut pixels,
             depth: &mut depth,
@@ -225,6 +193,7 @@ fn draw(panel: &PicturePanel<'_>, [w, h]: [u32; 2]) -> Vec<u8> {
 }
 
 struct Target<'a> {
+    settings: &'a PictureSettings,
     view: &'a View,
     pixels: &'a mut [u8],
     depth: &'a mut [f32],
@@ -241,39 +210,29 @@ impl Target<'_> {
     }
 
     fn surface(&mut self, seen: &[P3], mesh: &Painted<'_>) {
-        let mut normals = vec![V3::zeros(); seen.len()];
-        for f in mesh.faces {
-            let [a, b, c] = f.map(|v| seen[v as usize]);
-            let n = (b - a).cross(&(c - a));
-            f.iter().for_each(|v| normals[*v as usize] += n);
-        }
+        let (around, mut normals) = (Csr::of_faces(seen.len(), mesh.faces), Vec::new());
+        vertex_normals(Par::Rayon, seen, mesh.faces, &around, &mut normals);
         let mut buffer = VisibilityBuffer::default();
         let options = Options {
             par: Par::Rayon,
             ..Options::default()
         };
         rasterise_with(options, self.view, seen, mesh.faces, &mut buffer);
-        let light = V3::new(LIGHT[0], -LIGHT[1], -LIGHT[2]).normalize();
+        let (ambient, [x, y, z]) = (self.settings.ambient, self.settings.light);
+        let light = V3::new(x, -y, -z).normalize();
         let (w, h) = self.view.size();
         for v in 0..h {
             for u in 0..w {
-                let Some((id, b)) = interpolate(self.view, seen, mesh.faces, &buffer, [u, v])
-                else {
+                let found = interpolate(self.view, seen, mesh.faces, &buffer, [u, v]);
+                let Some((id, b)) = found else {
                     continue;
                 };
                 let f = mesh.faces[id as usize];
-                let sum = |g: &dyn Fn(usize) -> V3| -> V3 {
-                    (0..3).map(|k| g(f[k] as usize) * b[k]).sum()
-                };
-                let n = sum(&|i| {
-                    normals[i]
-                        .try_normalize(f32::MIN_POSITIVE)
-                        .unwrap_or_default()
-                });
+                let n: V3 = (0..3).map(|k| normals[f[k] as usize] * b[k]).sum();
                 let n = n.try_normalize(f32::MIN_POSITIVE).unwrap_or_default();
                 // Both sides of cloth are lit.
                 let n = if n.z > 0.0 { -n } else { n };
-                let lit = AMBIENT + (1.0 - AMBIENT) * n.dot(&light).max(0.0);
+                let lit = ambient + (1.0 - ambient) * n.dot(&light).max(0.0);
                 let color = mesh.color(id as usize, b);
                 let at = (v * w + u) as usize;
                 self.put(at, buffer.depth[at], (color * lit).into());
@@ -282,13 +241,13 @@ impl Target<'_> {
     }
 
     fn dots(&mut self, seen: &[P3], colors: &[[u8; 3]]) {
-        let (w, h) = self.view.size();
+        let ((w, h), dot) = (self.view.size(), self.settings.dot);
         for (p, c) in seen.iter().zip(colors) {
             let Some([x, y, z]) = self.view.project(p) else {
                 continue;
             };
-            for dy in 0..DOT {
-                for dx in 0..DOT {
+            for dy in 0..dot {
+                for dx in 0..dot {
                     let (u, v) = (x as i32 + dx, y as i32 + dy);
                     if (0..w as i32).contains(&u) && (0..h as i32).contains(&v) {
                         self.put(v as usize * w as usize + u as usize, z, c.map(f32::from));

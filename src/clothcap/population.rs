@@ -9,16 +9,15 @@ use tryon_body::{BodyShape, Template};
 pub fn population(template: &Template, count: usize, seed: u64) -> Vec<BodyShape> {
     let mut rng = rand_pcg::Pcg32::seed_from_u64(seed);
     let directions = template.shape_space().map_or(0, |s| s.names.len());
-    let coefficient = |rng: &mut rand_pcg::Pcg32| -> f64 {
-        let x: f64 = StandardNormal.sample(rng);
+    let mut coefficient = || -> f64 {
+        let x: f64 = StandardNormal.sample(&mut rng);
         x.clamp(-RANGE, RANGE)
     };
-    (0..count)
-        .map(|_| BodyShape {
-            coefficients: (0..directions).map(|_| coefficient(&mut rng)).collect(),
-            ..BodyShape::default()
-        })
-        .collect()
+    let shape = |_| BodyShape {
+        coefficients: (0..directions).map(|_| coefficient()).collect(),
+        ..BodyShape::default()
+    };
+    (0..count).map(shape).collect()
 }
 
 #[cfg(test)]

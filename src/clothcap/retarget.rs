@@ -3,6 +3,7 @@
 use super::CaptureError;
 use super::align::{Pull, PullPlace, SurfaceFit, SurfaceTerms};
 use super::multi::ClothPart;
+use super::settings::PenetrationSettings;
 use serde::{Deserialize, Serialize};
 use tryon_body::Template;
 use tryon_cloth::contact::{ClosestPoint, CollisionBody, CollisionModel, CollisionWorkspace, Part};
@@ -11,18 +12,8 @@ use tryon_geometry::math::{P3, V3};
 use tryon_geometry::par::{self, Par};
 use tryon_geometry::spatial::Bvh;
 
-/// Distance that cloth keeps from the skin, metres.
-const MARGIN: f32 = 0.003;
-/// Distance below which a vertex is pushed, metres. Between the two lies what smoothing gives back.
-const LEAST: f32 = 0.001;
-/// Tolerance of [`LEAST`] for a garment that was free before it was unposed and posed again, metres.
+/// Tolerance of the least distance for a garment that was free before it was unposed and posed again, metres.
 const ROUNDING: f32 = 1e-5;
-/// Rounds of pushing and smoothing, and of pushing alone.
-const ROUNDS: [usize; 2] = [5, 10];
-/// Weight of a pushed vertex beside that of an edge.
-const PUSH: f64 = 4.0;
-/// Pull of each vertex to its place without contact.
-const ANCHOR: f64 = 0.05;
 
 /// Report of one retargeting.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -50,6 +41,7 @@ pub struct SolidBody {
     body: CollisionBody,
     work: CollisionWorkspace,
     bvh: Bvh,
+    settings: PenetrationSettings,
 }
 
 impl SolidBody {
@@ -57,7 +49,7 @@ impl SolidBody {
     ///
     /// # Errors
     /// [`CaptureError::Solve`] for a template whose mesh cannot collide.
-    pub fn new(template: &Template) -> Result<Self, CaptureError> {
+    pub fn new(template: &Template, settings: PenetrationSettings) -> Result<Self, CaptureError> {
         let mesh = template.mesh();
         let model = collision_model(template, &Config::default()).map_err(fault)?;
         let mut out = Self {
@@ -65,6 +57,7 @@ impl SolidBody {
             body: CollisionBody::default(),
             work: CollisionWorkspace::default(),
             bvh: Bvh::new(mesh.faces(), mesh.vertices()),
+            settings,
         };
         out.place(mesh.vertices())?;
         Ok(out)
@@ -75,9 +68,8 @@ impl SolidBody {
     /// # Errors
     /// [`CaptureError::Solve`] for another template's vertices or values that are not finite.
     pub fn place(&mut self, posed: &[P3]) -> Result<(), CaptureError> {
-        self.body
-            .place(&self.model, posed, &mut self.work)
-            .map_err(fault)?;
+        let placed = self.body.place(&self.model, posed, &mut self.work);
+        placed.map_err(fault)?;
         self.bvh.refit(self.body.vertices());
         Ok(())
     }
@@ -120,8 +112,9 @@ impl SolidBody {
         if hit.signed_distance >= least {
             return None;
         }
-        let place = hit.point + hit.normal * MARGIN;
-        let is_free = self.below(&place, node).signed_distance >= LEAST && !self.encloses(&place);
+        let place = hit.point + hit.normal * self.settings.margin;
+        let is_above = self.below(&place, node).signed_distance >= self.settings.least;
+        let is_free = is_above && !self.encloses(&place);
         (is_free || self.encloses(p)).then_some(place)
     }
 
@@ -134,15 +127,12 @@ impl SolidBody {
     fn outside_of_all(&self, p: &P3) -> Option<P3> {
         let hit = self.bvh.closest(self.body.vertices(), p)?;
         let out = (hit.point - p).try_normalize(f32::MIN_POSITIVE)?;
-        Some(hit.point + out * MARGIN)
+        Some(hit.point + out * self.settings.margin)
     }
 }
 
 fn fault(e: impl std::fmt::Display) -> CaptureError {
-    CaptureError::Solve {
-        stage: "collision body",
-        why: e.to_string(),
-    }
+    CaptureError::solve("collision body", e)
 }
 
 /// Vertices of a garment next to bodies.
@@ -157,7 +147,7 @@ struct InnerSide {
 impl InnerSide {
     /// Moves what smoothing left inside or too near, each vertex by itself.
     fn project(&self, body: &SolidBody, vertices: &mut [P3]) {
-        for _ in 0..ROUNDS[1] {
+        for _ in 0..body.settings.projections {
             let is_near = self.push_out(body, vertices);
             let inside = self.inside(body, vertices);
             if !is_near && count(&inside) == 0 {
@@ -172,7 +162,7 @@ impl InnerSide {
     /// Moves vertices that are too near to their places outside; true if there is any.
     fn push_out(&self, body: &SolidBody, vertices: &mut [P3]) -> bool {
         let mut places = vec![None; vertices.len()];
-        let any = self.push((body, LEAST), vertices, &mut places);
+        let any = self.push(body, body.settings.least, vertices, &mut places);
         for (p, place) in vertices.iter_mut().zip(places) {
             *p = place.unwrap_or(*p);
         }
@@ -191,7 +181,8 @@ impl InnerSide {
     /// Targets of vertices nearer than a distance; true if there is any.
     fn push(
         &self,
-        (body, least): (&SolidBody, f32),
+        body: &SolidBody,
+        least: f32,
         vertices: &[P3],
         targets: &mut [Option<P3>],
     ) -> bool {
@@ -242,14 +233,14 @@ impl PenetrationSolver {
         body: &SolidBody,
         vertices: &mut Vec<P3>,
     ) -> Result<RetargetReport, CaptureError> {
-        let side = &self.side;
+        let (side, settings) = (&self.side, &body.settings);
         let inside_before = count(&side.inside(body, vertices));
         let mut report = RetargetReport {
             inside_before,
             ..RetargetReport::default()
         };
         let mut pushed: Vec<Option<P3>> = vec![None; vertices.len()];
-        let is_near = side.push((body, LEAST - ROUNDING), vertices, &mut pushed);
+        let is_near = side.push(body, settings.least - ROUNDING, vertices, &mut pushed);
         if !is_near && inside_before == 0 {
             return Ok(report);
         }
@@ -258,20 +249,19 @@ impl PenetrationSolver {
             model: &wanted,
             coupling: 1.0,
             smoothness: &[],
-            anchor: ANCHOR,
-            iterations: ROUNDS[0],
-            converged: 0.0,
-            still: 0.0,
+            anchor: settings.anchor,
+            iterations: settings.rounds,
+            settings: &settings.fit,
         };
         let fitted = self.fit.run(&terms, vertices, |x| {
             let pull = |(v, target): (u32, &Option<P3>)| {
                 Some(Pull {
                     at: PullPlace::Vertex(v),
-                    weight: PUSH,
+                    weight: settings.push,
                     target: (*target)?,
                 })
             };
-            let any = side.push((body, LEAST), x, &mut pushed);
+            let any = side.push(body, settings.least, x, &mut pushed);
             Ok(any.then(|| (0..).zip(&pushed).filter_map(pull).collect()))
         })?;
         report.solves = fitted.iterations;
@@ -288,8 +278,6 @@ impl PenetrationSolver {
     /// Moves vertices that are still inside towards neighbours outside: in a fold of the skin, where pushing out of one side
     /// is pushing into the other, cloth bunches up.
     pub(super) fn gather(&self, body: &SolidBody, vertices: &mut [P3], mut inside: Vec<bool>) {
-        /// Shares of the way that are tried.
-        const WAY: [f32; 4] = [0.25, 0.5, 0.75, 1.0];
         loop {
             let before = count(&inside);
             for &[a, b] in self.fit.edges() {
@@ -298,10 +286,9 @@ impl PenetrationSolver {
                         continue;
                     }
                     let way = vertices[w] - vertices[v];
-                    let tried: Vec<P3> = WAY.iter().map(|t| vertices[v] + way * *t).collect();
-                    let free = body.contains(&tried).iter().position(|b| !b);
-                    if let Some(k) = free {
-                        (vertices[v], inside[v]) = (tried[k], false);
+                    let mut tried = body.settings.ways.iter().map(|t| vertices[v] + way * *t);
+                    if let Some(free) = tried.find(|p| !body.encloses(p)) {
+                        (vertices[v], inside[v]) = (free, false);
                     }
                 }
             }

@@ -4,29 +4,20 @@ use super::CaptureError;
 pub(super) use super::cloud::mean_spacing;
 use super::cloud::{are_strays, neighbour_edges, plane_normals, spatial_order, turn_outwards};
 use super::floor::{Floor, are_floor_rests, inner_range};
+use super::settings::{CloudSettings, ScanSettings};
 use nalgebra::{Rotation3, Vector3};
 use serde::{Deserialize, Serialize};
 use tryon_formats::TexturePoint;
 use tryon_formats::scan::ScanMesh;
 use tryon_geometry::math::{P3, V3};
-use tryon_geometry::mesh::{Face, edges};
+use tryon_geometry::mesh::{Csr, Face, edges, vertex_normals};
+use tryon_geometry::par::Par;
 
-/// Least number of points of a person. Fewer leave whole limbs without one.
-const LEAST_POINTS: usize = 500;
-/// Heights of people with raised arms or without feet, metres.
-const HEIGHTS: [f64; 2] = [0.7, 2.6];
-/// Largest extent of a scan that is worked on, metres: half a person, and one with a piece of the room.
-const USABLE: [f64; 2] = [0.3, 20.0];
 /// Units of scans, metres: metre, centimetre, millimetre, inch, decimetre.
 const UNITS: [f64; 5] = [1.0, 0.01, 0.001, 0.0254, 0.1];
-/// Share of points left out at each end of an extent: strays.
-const STRAYS: f64 = 0.005;
-/// Share of the largest extent from which on an axis may be the upright one; arms spread are as wide as a person is tall.
-const UPRIGHT: f64 = 0.7;
 /// Largest coordinate, metres: single precision resolves a millimetre up to it.
 const FARTHEST: f64 = 8e3;
-/// Largest distance between the points of two scans that are the same but for noise, metres.
-const UNCHANGED: f32 = 1e-4;
+
 /// Units and axes of a scan file.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ScanFrame {
@@ -53,18 +44,15 @@ impl Default for ScanFrame {
 impl ScanFrame {
     /// Rotation from the file's axes to y up.
     pub fn rotation(&self) -> Rotation3<f64> {
-        let up = Vector3::from(self.up);
-        // Opposite directions leave the axis open; a half turn about x keeps left and right.
-        Rotation3::rotation_between(&up, &Vector3::y())
-            .unwrap_or_else(|| Rotation3::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI))
+        rotation_to_y(self.up.into())
     }
 
     /// The same frame with the floor that points stand on, if they do.
     pub fn with_floor(self, points: &[P3]) -> Self {
-        /// Least cosine between the floor's normal and the upright axis.
-        const LEVEL: f64 = 0.98;
+        let settings = ScanSettings::default();
         let up: Vector3<f64> = self.up.into();
-        let floor = Floor::find(points).filter(|f| f.up.cast::<f64>().dot(&up) > LEVEL);
+        let floor = Floor::find(points, &settings.floor)
+            .filter(|f| f.up.cast::<f64>().dot(&up) > settings.level);
         Self {
             floor: floor.map(|f| f64::from(f.top())),
             ..self
@@ -76,52 +64,46 @@ impl ScanFrame {
     /// # Errors
     /// [`CaptureError::NoPersonSize`] without any.
     pub fn candidates(points: &[P3]) -> Result<Vec<Self>, CaptureError> {
-        let Some(floor) = Floor::find(points) else {
-            return Self::along_axes(points);
+        let settings = ScanSettings::default();
+        let Some(floor) = Floor::find(points, &settings.floor) else {
+            return Self::along_axes(points, &settings);
         };
         let up = floor.up.cast::<f64>();
-        let turn = Self {
-            up: up.into(),
-            ..Self::default()
-        };
-        let turn = turn.rotation().cast::<f32>();
+        let turn = rotation_to_y(up).cast::<f32>();
         let person = points.iter().filter(|p| !floor.holds(p));
         let person: Vec<P3> = person.map(|p| turn * p).collect();
-        let upright = |f: &Self| f.up == Self::default().up;
-        let mut all = Self::along_axes(&person)?;
-        all.retain(upright);
+        let mut all = Self::along_axes(&person, &settings)?;
+        all.retain(|f| f.up == Self::default().up);
         for frame in &mut all {
             (frame.up, frame.floor) = (up.into(), Some(f64::from(floor.top())));
         }
         if all.is_empty() {
-            let extent = extent(&person);
+            let extent = extent(&person, settings.strays);
             return Err(CaptureError::NoPersonSize { extent });
         }
         Ok(all)
     }
 
     /// Frames with an upright axis of the file.
-    fn along_axes(points: &[P3]) -> Result<Vec<Self>, CaptureError> {
-        let extent = extent(points);
+    fn along_axes(points: &[P3], settings: &ScanSettings) -> Result<Vec<Self>, CaptureError> {
+        let extent = extent(points, settings.strays);
         let largest = extent.iter().copied().fold(0.0, f32::max);
-        let is_person =
-            |unit: &f64| (HEIGHTS[0]..=HEIGHTS[1]).contains(&(f64::from(largest) * unit));
+        let [least, most] = settings.heights;
+        let is_person = |unit: &f64| (least..=most).contains(&(f64::from(largest) * unit));
         let mut all = Vec::new();
         for &metres_per_unit in UNITS.iter().filter(|u| is_person(u)) {
-            let mut axes: Vec<usize> = (0..3)
-                .filter(|&a| f64::from(extent[a]) >= UPRIGHT * f64::from(largest))
-                .collect();
+            let is_tall =
+                |a: &usize| f64::from(extent[*a]) >= settings.upright * f64::from(largest);
+            let mut axes: Vec<usize> = (0..3).filter(is_tall).collect();
             axes.sort_by(|&a, &b| extent[b].total_cmp(&extent[a]));
-            for axis in axes {
-                for sign in [1.0, -1.0] {
-                    let mut up = [0.0; 3];
-                    up[axis] = sign;
-                    all.push(Self {
-                        metres_per_unit,
-                        up,
-                        floor: None,
-                    });
-                }
+            for (axis, sign) in axes.into_iter().flat_map(|a| [(a, 1.0), (a, -1.0)]) {
+                let mut frame = Self {
+                    metres_per_unit,
+                    up: [0.0; 3],
+                    floor: None,
+                };
+                frame.up[axis] = sign;
+                all.push(frame);
             }
         }
         if all.is_empty() {
@@ -133,18 +115,26 @@ impl ScanFrame {
     }
 }
 
-/// Extent of a cloud along x, y, z without its strays.
-fn extent(points: &[P3]) -> [f32; 3] {
-    std::array::from_fn(|axis| {
-        let [low, high] = axis_range(points, axis, STRAYS);
-        high - low
-    })
+fn rotation_to_y(up: Vector3<f64>) -> Rotation3<f64> {
+    // Opposite directions leave the axis open; a half turn about x keeps left and right.
+    Rotation3::rotation_between(&up, &Vector3::y())
+        .unwrap_or_else(|| Rotation3::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI))
 }
 
-/// Range of the finite coordinates along an axis without a share of the points at each end.
-pub(super) fn axis_range(points: &[P3], axis: usize, strays: f64) -> [f32; 2] {
-    let finite = points.iter().map(|p| p[axis]).filter(|v| v.is_finite());
-    inner_range(finite, strays)
+/// Extent of a cloud along x, y, z without its strays.
+fn extent(points: &[P3], strays: f64) -> [f32; 3] {
+    let [low, high] = bounds(points, strays);
+    (high - low).into()
+}
+
+/// Bounds of the finite coordinates without a share of strays at each end of an axis.
+pub(super) fn bounds(points: &[P3], strays: f64) -> [P3; 2] {
+    let range = |axis: usize| {
+        let finite = points.iter().map(|p| p[axis]).filter(|v| v.is_finite());
+        inner_range(finite, strays)
+    };
+    let ranges = [0, 1, 2].map(range);
+    [0, 1].map(|end| P3::from(ranges.map(|r| r[end])))
 }
 
 /// Colour of a scan's texture between its points.
@@ -201,13 +191,11 @@ impl BodyScan {
     /// # Errors
     /// [`CaptureError::TooFewPoints`]; [`CaptureError::NoPersonSize`] if the frame makes it no person's size.
     pub fn new(file: &ScanMesh, frame: &ScanFrame) -> Result<Self, CaptureError> {
+        let settings = ScanSettings::default();
         let turn = frame.rotation();
         let up: Vector3<f64> = frame.up.into();
-        let is_floor = |p: &P3| {
-            frame
-                .floor
-                .is_some_and(|top| up.dot(&p.coords.cast::<f64>()) < top)
-        };
+        let height = |p: &P3| up.dot(&p.coords.cast::<f64>());
+        let is_floor = |p: &P3| frame.floor.is_some_and(|top| height(p) < top);
         let farthest = FARTHEST / frame.metres_per_unit;
         let mut seen = std::collections::HashMap::new();
         let mut scan = Self::default();
@@ -225,16 +213,12 @@ impl BodyScan {
             if point == next {
                 let q = turn * (p.cast::<f64>() * frame.metres_per_unit);
                 scan.points.push(q.cast());
-                if let Some(c) = file.colors.get(row) {
-                    scan.colors.push(*c);
-                }
+                scan.colors.extend(file.colors.get(row));
                 if let Some(n) = file.normals.get(row) {
                     let n = (turn * n.cast::<f64>()).cast::<f32>();
                     let unit = n.try_normalize(f32::MIN_POSITIVE);
-                    scan.normals.push(
-                        unit.filter(|n| n.iter().all(|v| v.is_finite()))
-                            .unwrap_or_default(),
-                    );
+                    let unit = unit.filter(|n| n.iter().all(|v| v.is_finite()));
+                    scan.normals.push(unit.unwrap_or_default());
                 }
             } else {
                 scan.left_out.repeated += 1;
@@ -245,45 +229,32 @@ impl BodyScan {
         // Files with normals are surfaces that were cleaned before.
         scan.is_cloud = file.faces.is_empty() && file.normals.is_empty();
         if scan.is_cloud {
-            scan.leave_out_strays();
+            let strays = are_strays(&scan.points, &settings.cloud);
+            scan.left_out.strays += scan.leave_out(&strays);
             if let Some(top) = frame.floor {
-                scan.leave_out_floor_rests((top * frame.metres_per_unit) as f32);
+                // Floors of several cameras are tilted against each other.
+                let top = (top * frame.metres_per_unit) as f32;
+                let rests = are_floor_rests(&scan.points, top, &settings.floor);
+                scan.left_out.floor += scan.leave_out(&rests);
             }
         }
-        let largest = extent(&scan.points).into_iter().fold(0.0, f32::max);
-        if !(USABLE[0]..=USABLE[1]).contains(&f64::from(largest)) {
-            return Err(CaptureError::NoPersonSize {
-                extent: extent(&file.points),
-            });
+        let extents = extent(&scan.points, settings.strays);
+        let largest = extents.into_iter().fold(0.0, f32::max);
+        let [least, most] = settings.usable;
+        if !(least..=most).contains(&f64::from(largest)) {
+            let extent = extent(&file.points, settings.strays);
+            return Err(CaptureError::NoPersonSize { extent });
         }
         if scan.colors.len() != scan.points.len() {
             // Colours of some points only say nothing of the others.
             scan.colors.clear();
         }
-        let corner = |v: &u32| scan.point_of_row.get(*v as usize).copied();
-        scan.faces = file
-            .faces
-            .iter()
-            .filter_map(|f| Some([corner(&f[0])?, corner(&f[1])?, corner(&f[2])?]))
-            .filter(|f| f.iter().all(|v| *v != u32::MAX))
-            .filter(|f| f[0] != f[1] && f[1] != f[2] && f[0] != f[2])
-            .collect();
+        let faces = file.faces.iter().filter_map(|f| scan.corners(f));
+        let distinct = |f: &Face| f[0] != f[1] && f[1] != f[2] && f[0] != f[2];
+        scan.faces = faces.filter(distinct).collect();
         scan.texture = scan.texture_of(file);
-        scan.find_normals();
+        scan.find_normals(&settings.cloud);
         Ok(scan)
-    }
-
-    /// Leaves out the points of a cloud without faces that lie apart from the rest.
-    fn leave_out_strays(&mut self) {
-        let strays = are_strays(&self.points);
-        self.left_out.strays += self.leave_out(&strays);
-    }
-
-    /// Leaves out what lies low and apart from the legs: floors of several cameras are tilted against each other. `top` is
-    /// the height of the floor, metres.
-    fn leave_out_floor_rests(&mut self, top: f32) {
-        let rests = are_floor_rests(&self.points, top);
-        self.left_out.floor += self.leave_out(&rests);
     }
 
     /// Leaves out some points; the number of rows that had one of them.
@@ -305,25 +276,26 @@ impl BodyScan {
         rows
     }
 
+    /// Points of a file's face; `None` if a corner is left out.
+    fn corners(&self, face: &Face) -> Option<Face> {
+        let point = |v: u32| {
+            self.point_of_row
+                .get(v as usize)
+                .filter(|p| **p != u32::MAX)
+        };
+        let [a, b, c] = face.map(point);
+        Some([*a?, *b?, *c?])
+    }
+
     /// Texture of a file whose points are known.
     fn texture_of(&self, file: &ScanMesh) -> Vec<TextureColor> {
         let color = |t: &TexturePoint| {
-            let face = file.faces.get(t.face as usize)?;
-            let corners = face.map(|v| self.point_of_row.get(v as usize).copied());
-            let [a, b, c] = [corners[0]?, corners[1]?, corners[2]?];
-            let place = |p: u32| self.points.get(p as usize).map(|p| p.coords);
-            let [x, y, z] = [place(a)?, place(b)?, place(c)?];
+            let corners = self.corners(file.faces.get(t.face as usize)?)?;
+            let [x, y, z] = corners.map(|p| self.points[p as usize].coords);
             let w = t.weights;
-            let corner = if w[0] >= w[1] && w[0] >= w[2] {
-                a
-            } else if w[1] >= w[2] {
-                b
-            } else {
-                c
-            };
             Some(TextureColor {
                 at: P3::from(x * w[0] + y * w[1] + z * w[2]),
-                point: corner,
+                point: corners[largest(w)],
                 color: t.color,
             })
         };
@@ -339,29 +311,26 @@ impl BodyScan {
     }
 
     /// The scan, if it has the points of a person.
-    ///
-    /// # Errors
-    /// [`CaptureError::TooFewPoints`].
     pub(super) fn checked(self) -> Result<Self, CaptureError> {
-        if self.points.len() < LEAST_POINTS {
-            return Err(CaptureError::TooFewPoints {
-                points: self.points.len(),
-                least: LEAST_POINTS,
-            });
+        let (points, least) = (self.points.len(), ScanSettings::default().least_points);
+        if points < least {
+            return Err(CaptureError::TooFewPoints { points, least });
         }
         Ok(self)
     }
 
     /// Normals from faces, else from the file, else from neighbours, outwards where they are seen from.
-    fn find_normals(&mut self) {
+    fn find_normals(&mut self, settings: &CloudSettings) {
         if !self.faces.is_empty() {
-            self.normals = face_normals(&self.points, &self.faces);
+            let (points, faces) = (&self.points, &self.faces);
+            let around = Csr::of_faces(points.len(), faces);
+            vertex_normals(Par::Rayon, points, faces, &around, &mut self.normals);
             self.oriented = true;
         } else if self.normals.len() == self.points.len() {
             self.oriented = true;
         } else {
-            self.normals = plane_normals(&self.points);
-            self.oriented = turn_outwards(&self.points, &mut self.normals);
+            self.normals = plane_normals(&self.points, settings);
+            self.oriented = turn_outwards(&self.points, &mut self.normals, settings);
         }
         if self.oriented && is_inside_out(&self.points, &self.normals) {
             self.normals.iter_mut().for_each(|n| *n = -*n);
@@ -371,11 +340,17 @@ impl BodyScan {
 
     /// The same points in the same colours, none farther from its place in the other scan than noise.
     pub fn is_unchanged(&self, other: &Self) -> bool {
-        let near = |(p, q): (&P3, &P3)| (p - q).norm_squared() <= UNCHANGED * UNCHANGED;
+        let most = ScanSettings::default().unchanged;
+        let near = |(p, q): (&P3, &P3)| (p - q).norm_squared() <= most * most;
         self.points.len() == other.points.len()
             && self.colors == other.colors
             && self.faces == other.faces
             && self.points.iter().zip(&other.points).all(near)
+    }
+
+    /// The normal of a point and a unit normal of a surface [`agree`].
+    pub(super) fn agrees(&self, point: usize, surface: &V3, least: f32) -> bool {
+        agree(&self.normals[point], surface, self.oriented, least)
     }
 
     /// Order of the points in which neighbours are near in space, shape `[points]`.
@@ -389,13 +364,32 @@ impl BodyScan {
         if !self.faces.is_empty() {
             return edges(&self.faces);
         }
-        neighbour_edges(&self.points, is_wanted)
+        neighbour_edges(&self.points, &ScanSettings::default().cloud, is_wanted)
     }
 
     /// Label of each row of the file from one a point; `absent` for rows left out.
     pub fn rows<T: Copy>(&self, of_points: &[T], absent: T) -> Vec<T> {
         let label = |p: &u32| of_points.get(*p as usize).copied().unwrap_or(absent);
         self.point_of_row.iter().map(label).collect()
+    }
+}
+
+/// A scan point's normal, zero if unknown, agrees with one of a surface to the least cosine; one that isn't oriented is of
+/// either sign.
+pub(super) fn agree(normal: &V3, surface: &V3, oriented: bool, least: f32) -> bool {
+    let cos = surface.dot(normal);
+    let cos = if oriented { cos } else { cos.abs() };
+    *normal == V3::zeros() || cos >= least
+}
+
+/// Number of the largest of three shares, the first of equal ones.
+pub(super) fn largest([a, b, c]: [f32; 3]) -> usize {
+    if a >= b && a >= c {
+        0
+    } else if b >= c {
+        1
+    } else {
+        2
     }
 }
 
@@ -411,24 +405,8 @@ fn retain<T>(values: &mut Vec<T>, left_out: &[bool]) {
 fn is_inside_out(points: &[P3], normals: &[V3]) -> bool {
     let n = points.len().max(1) as f32;
     let middle = points.iter().map(|p| p.coords).sum::<V3>() / n;
-    let outwards = points
-        .iter()
-        .zip(normals)
-        .map(|(p, n)| f64::from(n.dot(&(p.coords - middle))));
-    outwards.sum::<f64>() < 0.0
-}
-
-/// Mean of the normals of the faces around each point, by area.
-fn face_normals(points: &[P3], faces: &[Face]) -> Vec<V3> {
-    let mut sums = vec![V3::zeros(); points.len()];
-    for f in faces {
-        let [a, b, c] = f.map(|v| points[v as usize]);
-        let n = (b - a).cross(&(c - a));
-        f.iter().for_each(|v| sums[*v as usize] += n);
-    }
-    sums.iter()
-        .map(|n| n.try_normalize(f32::MIN_POSITIVE).unwrap_or_default())
-        .collect()
+    let outwards = |(p, n): (&P3, &V3)| f64::from(n.dot(&(p.coords - middle)));
+    points.iter().zip(normals).map(outwards).sum::<f64>() < 0.0
 }
 
 #[cfg(test)]
@@ -437,16 +415,25 @@ mod tests {
 
     /// A cylinder of 1.7 m about `axis`, in units of `unit` metres.
     fn cylinder(axis: usize, unit: f32) -> Vec<P3> {
-        (0..4000)
-            .map(|i| {
-                let angle = i as f32 * 2.4;
-                let mut p = [0.2 * angle.cos(), 0.15 * angle.sin(), 0.0];
-                p[2] = 1.7 * i as f32 / 4000.0;
-                let mut q = P3::origin();
-                (0..3).for_each(|k| q[(axis + 1 + k) % 3] = p[k] / unit);
-                q
-            })
-            .collect()
+        let point = |i: i32| {
+            let angle = i as f32 * 2.4;
+            let p = [
+                0.2 * angle.cos(),
+                0.15 * angle.sin(),
+                1.7 * i as f32 / 4000.0,
+            ];
+            let mut q = P3::origin();
+            (0..3).for_each(|k| q[(axis + 1 + k) % 3] = p[k] / unit);
+            q
+        };
+        (0..4000).map(point).collect()
+    }
+
+    #[test]
+    fn normals_of_either_sign_and_unknown_ones_agree() {
+        let agrees = |normal: V3, oriented| agree(&normal, &V3::z(), oriented, 0.2);
+        assert!(agrees(V3::z(), true) && !agrees(-V3::z(), true) && agrees(-V3::z(), false));
+        assert!(!agrees(V3::x(), false) && agrees(V3::zeros(), true));
     }
 
     #[test]
@@ -461,15 +448,11 @@ mod tests {
                 ..ScanMesh::default()
             };
             let scan = BodyScan::new(&file, &frames[0]).expect("enough points");
-            let top = scan.points.iter().map(|p| p.y).fold(f32::MIN, f32::max);
-            let low = scan.points.iter().map(|p| p.y).fold(f32::MAX, f32::min);
-            assert!((top - low - 1.7).abs() < 0.01);
+            assert!((extent(&scan.points, 0.0)[1] - 1.7).abs() < 0.01);
         }
-        let small: Vec<P3> = cylinder(1, 1.0).iter().map(|p| p * 3.7).collect();
-        assert!(matches!(
-            ScanFrame::candidates(&small),
-            Err(CaptureError::NoPersonSize { .. })
-        ));
+        let large: Vec<P3> = cylinder(1, 1.0).iter().map(|p| p * 3.7).collect();
+        let refused = ScanFrame::candidates(&large);
+        assert!(matches!(refused, Err(CaptureError::NoPersonSize { .. })));
     }
 
     #[test]
@@ -485,13 +468,8 @@ mod tests {
         let scan = BodyScan::new(&file, &ScanFrame::default()).expect("enough points");
         assert_eq!(scan.points.len(), points.len() - 2);
         assert_eq!(scan.point_of_row[7], u32::MAX);
-        let left_out = LeftOut {
-            not_finite: 1,
-            floor: 0,
-            repeated: 1,
-            strays: 0,
-        };
-        assert_eq!(scan.left_out, left_out);
+        let left_out = (scan.left_out.not_finite, scan.left_out.repeated);
+        assert_eq!((left_out, scan.left_out.floor), ((1, 1), 0));
         assert_eq!(scan.point_of_row[9], scan.point_of_row[8]);
         let mut corners = scan.faces[0];
         corners.sort_unstable();
@@ -503,9 +481,8 @@ mod tests {
 
     #[test]
     fn clouds_get_normals_outwards() {
-        let points = cylinder(1, 1.0);
         let file = ScanMesh {
-            points,
+            points: cylinder(1, 1.0),
             ..ScanMesh::default()
         };
         let scan = BodyScan::new(&file, &ScanFrame::default()).expect("enough points");

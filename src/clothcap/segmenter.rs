@@ -1,19 +1,18 @@
 //! Scans of one subject, aligned and segmented in order.
 
 use super::CaptureError;
-use super::align::{AlignedBody, Aligner, Alignment, ClothedTemplate, Start};
+use super::align::{Aligner, Alignment, Start};
 use super::camera_gains::without_gains;
+use super::multi::grow;
 use super::scan::BodyScan;
 use super::segment::{
-    LabelConfig, Labelling, NodeColors, label_nodes, label_scan, relabel_nodes, seen_slices,
+    LabelConfig, Labelling, NodeColors, ScanLabeller, label_nodes, relabel_nodes, seen_slices,
 };
+use super::settings::AlignmentSettings;
 use super::topology::ClothTemplate;
 use std::sync::Arc;
 use tryon_body::Template;
 use tryon_geometry::mesh::Csr;
-
-/// Farthest that a point of a garment lies off the surface, metres: the surface follows cloth to a few millimetres.
-const FARTHEST: f32 = 0.10;
 
 /// Aligned and labelled scan.
 #[derive(Clone, Debug)]
@@ -44,6 +43,13 @@ impl SegmentedScan {
         self.labels.iter().map(|l| parts[usize::from(*l)]).collect()
     }
 
+    /// Vertex of the clothed template nearest to each scan point on the single mesh, shape `[points]`.
+    pub(super) fn nearest_vertices(&self, cloth: &ClothTemplate) -> Vec<u32> {
+        let faces = cloth.template().mesh().faces();
+        let matches = self.alignment.matches.iter();
+        matches.map(|m| m.nearest_vertex(faces)).collect()
+    }
+
     /// Membership in a garment of each scan point, shape `[points]`.
     pub fn covered(&self) -> Vec<bool> {
         let is_garment = |l: &u8| self.labelling.slots[usize::from(*l)].is_garment();
@@ -51,14 +57,11 @@ impl SegmentedScan {
     }
 }
 
-/// Rings of nodes about a boundary of labels within which points may change theirs, their neighbours included.
-const NEAR: usize = 5;
-
 /// Aligns and segments scans; the first one gives the clothed template and the appearances of the garments.
 #[derive(Debug)]
 pub struct ScanSegmenter {
+    pub(super) aligner: Aligner,
     config: LabelConfig,
-    aligner: Aligner,
     first: Option<Labelling>,
 }
 
@@ -68,33 +71,21 @@ impl ScanSegmenter {
     /// # Errors
     /// [`CaptureError::Solve`] for a template too large.
     pub fn new(template: Arc<Template>, config: LabelConfig) -> Result<Self, CaptureError> {
-        Ok(Self {
-            aligner: Aligner::new(template)?,
-            config,
-            first: None,
-        })
+        let aligner = Aligner::new(template, AlignmentSettings::default())?;
+        Ok(Self::with_aligner(aligner, config, None))
     }
 
-    /// Segmenter that continues after a first scan with this labelling; `last` is the body of the scan before.
-    ///
-    /// # Errors
-    /// As [`ScanSegmenter::new`].
-    pub fn resume(
-        template: Arc<Template>,
+    /// Segmenter on an aligner; `first` is the labelling of a first scan that the aligner continues after.
+    pub(super) fn with_aligner(
+        aligner: Aligner,
         config: LabelConfig,
-        first: Labelling,
-        (clothed, last): (ClothedTemplate, AlignedBody),
-    ) -> Result<Self, CaptureError> {
-        Ok(Self {
-            aligner: Aligner::resume(template, clothed, last)?,
+        first: Option<Labelling>,
+    ) -> Self {
+        Self {
+            aligner,
             config,
-            first: Some(first),
-        })
-    }
-
-    /// Skips nothing from now on.
-    pub fn skip_nothing(&mut self) {
-        self.aligner.skip_nothing();
+            first,
+        }
     }
 
     /// Starts the first scan at a person found before.
@@ -102,19 +93,9 @@ impl ScanSegmenter {
         self.aligner.start_at(start);
     }
 
-    /// Starts the next scan in the pose of a body, that of the last scan under its cloth.
-    pub(super) fn follow(&mut self, body: &AlignedBody) {
-        self.aligner.follow(body);
-    }
-
     /// Template of the surface, with or without legs joined.
     pub fn cloth(&self) -> &ClothTemplate {
         self.aligner.cloth()
-    }
-
-    /// Clothed template, once a scan is aligned.
-    pub fn clothed(&self) -> Option<&ClothedTemplate> {
-        self.aligner.clothed()
     }
 
     /// Aligns and segments the next scan.
@@ -122,39 +103,38 @@ impl ScanSegmenter {
     /// # Errors
     /// [`CaptureError::NoPerson`], or [`CaptureError::NoGarment`] if the first scan shows none.
     pub fn step(&mut self, scan: &BodyScan) -> Result<SegmentedScan, CaptureError> {
+        let settings = &self.config.settings;
         let alignment = self.aligner.align(scan)?;
         let cloth = self.aligner.cloth();
         let template = cloth.template();
-        let evened = without_gains(scan, &alignment, template);
+        let evened = without_gains(scan, &alignment, template, settings);
         let scan = evened.as_ref().unwrap_or(scan);
-        let nodes = NodeColors::new(scan, &alignment, template);
+        let nodes = NodeColors::new(scan, &alignment, template, settings);
         let mut labelling = match &self.first {
             None => label_nodes(cloth, &nodes, &self.config)?,
             Some(first) => relabel_nodes(cloth, &nodes, first, &self.config)?,
         };
-        let around = (
-            template.mesh().faces(),
-            template.topology().vertex_neighbours(),
-        );
-        labelling.join_islands(around.1);
-        let is_near = near_boundaries(&labelling, around.1);
-        let node_of = |i: usize| {
-            let m = &alignment.matches[i];
-            around.0[m.face as usize][m.nearest_corner()]
+        let around = template.topology().vertex_neighbours();
+        labelling.join_islands(around, &settings.islands);
+        let is_near = near_boundaries(&labelling, around, settings.boundary_rings);
+        let (matches, faces) = (&alignment.matches, template.mesh().faces());
+        let edges = scan.edges(|i| is_near[matches[i].nearest_vertex(faces) as usize]);
+        let labeller = ScanLabeller {
+            scan,
+            edges: &edges,
+            matches,
+            template,
+            settings,
         };
-        let edges = scan.edges(|i| is_near[node_of(i) as usize]);
-        let mut labels = label_scan((scan, &edges), &alignment.matches, around, &labelling)?;
+        let mut labels = labeller.run(&labelling)?;
         // Walls and things beside are no garments.
-        let far = alignment.matches.iter().map(|m| m.distance > FARTHEST);
+        let far = matches.iter().map(|m| m.distance > settings.farthest);
         let far = labels.iter_mut().zip(far).filter(|(_, far)| *far);
         far.for_each(|(label, _)| *label = 0);
         labelling.adopt(&nodes, &labels);
         labelling.leave_unseen(&seen_slices(template, &nodes));
-        if !labelling
-            .labels
-            .iter()
-            .any(|l| labelling.slots[usize::from(*l)].is_garment())
-        {
+        let is_garment = |l: &u8| labelling.slots[usize::from(*l)].is_garment();
+        if !labelling.labels.iter().any(is_garment) {
             return Err(CaptureError::NoGarment);
         }
         self.first.get_or_insert_with(|| labelling.clone());
@@ -169,16 +149,11 @@ impl ScanSegmenter {
     }
 }
 
-/// Nodes within [`NEAR`] rings of one with another label, shape `[nodes]`.
-fn near_boundaries(labelling: &Labelling, around: &Csr) -> Vec<bool> {
+/// Nodes within so many rings of one with another label, shape `[nodes]`.
+fn near_boundaries(labelling: &Labelling, around: &Csr, rings: usize) -> Vec<bool> {
     let other = |v: usize, w: usize| labelling.labels[v] != labelling.labels[w];
     let beside = |v: usize| around.row(v).iter().any(|w| other(v, *w as usize));
     let mut near: Vec<bool> = (0..labelling.labels.len()).map(beside).collect();
-    for _ in 1..NEAR {
-        let before = near.clone();
-        for (v, near) in near.iter_mut().enumerate() {
-            *near = *near || around.row(v).iter().any(|w| before[*w as usize]);
-        }
-    }
+    (1..rings).for_each(|_| grow(around, &mut near));
     near
 }

@@ -7,7 +7,7 @@ use rand::{Rng, SeedableRng};
 use tryon_body::{BodyShape, BoneTransforms, Pose, embedded, skin};
 use tryon_formats::scan::ScanMesh;
 use tryon_geometry::math::{P3, Rigid, V3, World};
-use tryon_geometry::mesh::{Face, Topology, vertex_normals};
+use tryon_geometry::mesh::{Face, face_normal};
 use tryon_geometry::par::Par;
 
 /// Points of a test scan.
@@ -43,33 +43,17 @@ impl TestScan {
         let mut bones = BoneTransforms::default();
         pose.bones(template.skeleton(), &rest, &mut bones);
         let mut body = Vec::new();
-        skin(
-            Par::Seq,
-            &rest.vertices,
-            template.weights(),
-            &bones,
-            &mut body,
-        );
-
-        let faces = template.mesh().faces();
-        let topology = Topology::new(template.mesh()).expect("a manifold");
-        let mut normals = Vec::new();
-        vertex_normals(
-            Par::Seq,
-            &body,
-            faces,
-            topology.vertex_faces(),
-            &mut normals,
-        );
-        let labels: Vec<u8> = BodyRegion::of_vertices(&template)
-            .iter()
-            .map(|r| match r {
-                BodyRegion::Chest | BodyRegion::Abdomen | BodyRegion::UpperArm => 1,
-                BodyRegion::Pelvis | BodyRegion::Thigh | BodyRegion::Shin => 2,
-                BodyRegion::Foot => 3,
-                _ => 0,
-            })
-            .collect();
+        let weights = template.weights();
+        skin(Par::Seq, &rest.vertices, weights, &bones, &mut body);
+        let normals = template.normals(&body);
+        let label = |r: &BodyRegion| match r {
+            BodyRegion::Chest | BodyRegion::Abdomen | BodyRegion::UpperArm => 1,
+            BodyRegion::Pelvis | BodyRegion::Thigh | BodyRegion::Shin => 2,
+            BodyRegion::Foot => 3,
+            _ => 0,
+        };
+        let regions = BodyRegion::of_vertices(&template);
+        let labels: Vec<u8> = regions.iter().map(label).collect();
         let thickness = [0.0, SHIRT, TROUSERS, 0.004];
         let surface: Vec<P3> = (0..body.len())
             .map(|v| body[v] + normals[v] * thickness[usize::from(labels[v])])
@@ -80,7 +64,7 @@ impl TestScan {
             labels: &labels,
             colors: [[205, 160, 130], shirt, trousers, [60, 45, 40]],
         };
-        let (file, labels) = painted.sample(faces);
+        let (file, labels) = painted.sample(template.mesh().faces());
         Self { file, labels, body }
     }
 
@@ -102,15 +86,11 @@ impl PaintedSurface<'_> {
     /// Points of even density, and their labels.
     fn sample(&self, faces: &[Face]) -> (ScanMesh, Vec<u8>) {
         let mut rng = rand_pcg::Pcg32::seed_from_u64(9);
-        let areas: Vec<f64> = faces
-            .iter()
-            .scan(0.0, |sum, f| {
-                let [a, b, c] = f.map(|v| self.vertices[v as usize]);
-                *sum += f64::from((b - a).cross(&(c - a)).norm());
-                Some(*sum)
-            })
-            .collect();
-        let total = areas.last().copied().unwrap_or(0.0);
+        let (mut areas, mut total) = (Vec::new(), 0.0);
+        for f in faces {
+            total += f64::from(face_normal(self.vertices, f).norm());
+            areas.push(total);
+        }
         let mut file = ScanMesh::default();
         let mut point_labels = Vec::new();
         for _ in 0..POINTS {
@@ -124,17 +104,15 @@ impl PaintedSurface<'_> {
             let sum = |x: &dyn Fn(usize) -> V3| -> V3 {
                 (0..3).map(|k| x(face[k] as usize) * w[k]).sum()
             };
-            let most = (0..3)
-                .max_by(|a, b| w[*a].total_cmp(&w[*b]))
-                .expect("three");
-            let label = self.labels[face[most] as usize];
-            file.points
-                .push(P3::from(sum(&|i| self.vertices[i].coords)));
+            let most = (0..3).max_by(|a, b| w[*a].total_cmp(&w[*b]));
+            let label = self.labels[face[most.expect("three")] as usize];
+            let point = sum(&|i| self.vertices[i].coords);
+            file.points.push(P3::from(point));
             file.normals.push(sum(&|i| self.normals[i]).normalize());
             let shade = 0.85 + 0.3 * rng.random::<f32>();
-            file.colors.push(
-                self.colors[usize::from(label)].map(|c| (f32::from(c) * shade).min(255.0) as u8),
-            );
+            let color = self.colors[usize::from(label)];
+            let shaded = color.map(|c| (f32::from(c) * shade).min(255.0) as u8);
+            file.colors.push(shaded);
             point_labels.push(label);
         }
         (file, point_labels)

@@ -11,14 +11,21 @@ use tryon_geometry::spatial::Bvh;
 const BLUE: [u8; 3] = [60, 90, 190];
 const GREY: [u8; 3] = [70, 70, 75];
 
+fn capture(config: OutfitCaptureConfig) -> OutfitCapture {
+    OutfitCapture::new(embedded::template(), config).expect("a capture")
+}
+
+/// Largest distance between corresponding vertices of all garments, metres.
+fn worst(a: &[Vec<P3>], b: &[Vec<P3>]) -> f32 {
+    let pairs = a.iter().flatten().zip(b.iter().flatten());
+    pairs.map(|(p, q)| (p - q).norm()).fold(0.0, f32::max)
+}
+
 /// Mean distance of points from the surface of a posed template, metres.
 fn mean_distance(points: &[P3], surface: &[P3]) -> f64 {
     let bvh = Bvh::new(embedded::template().mesh().faces(), surface);
-    let distance = |p: &P3| {
-        bvh.closest(surface, p)
-            .map_or(0.0, |f| f64::from(f.distance))
-    };
-    points.iter().map(distance).sum::<f64>() / points.len() as f64
+    let found = points.iter().filter_map(|p| bvh.closest(surface, p));
+    found.map(|f| f64::from(f.distance)).sum::<f64>() / points.len() as f64
 }
 
 #[test]
@@ -26,8 +33,7 @@ fn an_outfit_is_captured_and_fits_its_own_body_exactly() {
     let template = embedded::template();
     let truth = TestScan::new(0.6, BLUE, GREY);
     let scan = truth.scan();
-    let mut capture =
-        OutfitCapture::new(template.clone(), CaptureConfig::default()).expect("a capture");
+    let mut capture = capture(OutfitCaptureConfig::default());
     let frame = capture.frame(&scan).expect("a person in clothes");
     let outfit = capture.outfit().expect("an outfit");
 
@@ -47,17 +53,11 @@ fn an_outfit_is_captured_and_fits_its_own_body_exactly() {
     let displacements = FrameDisplacements::of(&template, &frame);
     let body = template.personalise(&outfit.body.shape);
     let mut dresser = BodyDresser::new(template.clone(), &outfit.cloth).expect("a dresser");
-    let own = dresser
-        .dress(&body, &displacements, &frame.undressed.body.pose)
-        .expect("dressed");
-    for (a, b) in own.garments.iter().zip(&frame.garments) {
-        let worst = a
-            .iter()
-            .zip(b)
-            .map(|(p, q)| (p - q).norm())
-            .fold(0.0, f32::max);
-        assert!(worst < 1e-4, "{worst}");
-    }
+    let pose = &frame.undressed.body.pose;
+    let own = dresser.dress(&body, &displacements, pose);
+    let own = own.expect("dressed");
+    let moved = worst(&own.garments, &frame.garments);
+    assert!(moved < 1e-4, "{moved}");
 
     // Its textures show the colours of the scan, but for its shades of 15 %.
     for (texture, wanted) in capture.textures().iter().zip([BLUE, GREY]) {
@@ -70,35 +70,25 @@ fn an_outfit_is_captured_and_fits_its_own_body_exactly() {
         }
         for (sum, wanted) in sum.iter().zip(wanted) {
             let mean = sum / count;
-            assert!(
-                (mean - f64::from(wanted)).abs() < 12.0,
-                "{mean} for {wanted}"
-            );
+            let off = (mean - f64::from(wanted)).abs();
+            assert!(off < 12.0, "{mean} for {wanted}");
         }
     }
 
     // No vertex is inside any of some other bodies.
     for shape in population(&template, 4, 3) {
         let body = template.personalise(&shape);
-        let pose = &frame.undressed.body.pose;
         let dressed = dresser.dress(&body, &displacements, pose).expect("dressed");
-        let inside: Vec<usize> = dressed.reports.iter().map(|r| r.inside).collect();
-        assert!(
-            inside.iter().all(|n| *n == 0),
-            "{inside:?} inside {shape:?}"
-        );
+        let inside: usize = dressed.reports.iter().map(|r| r.inside).sum();
+        assert_eq!(inside, 0, "inside {shape:?}");
     }
 }
 
 #[test]
 fn a_stopped_capture_continues_where_it_ended() {
     let template = embedded::template();
-    let scans = [
-        TestScan::new(0.6, BLUE, GREY).scan(),
-        TestScan::new(0.7, BLUE, GREY).scan(),
-    ];
-    let mut whole =
-        OutfitCapture::new(template.clone(), CaptureConfig::default()).expect("a capture");
+    let scans = [0.6, 0.7].map(|yaw| TestScan::new(yaw, BLUE, GREY).scan());
+    let mut whole = capture(OutfitCaptureConfig::default());
     let first = whole.frame(&scans[0]).expect("captured");
     let textures = whole.textures().to_vec();
     let second = whole.frame(&scans[1]).expect("captured");
@@ -122,50 +112,37 @@ fn a_stopped_capture_continues_where_it_ended() {
         report: first.report.clone(),
     };
     let displacements = FrameDisplacements::of(&template, &first);
-    archive
-        .write_frame(&record, &displacements)
-        .expect("written");
+    let written = archive.write_frame(&record, &displacements);
+    written.expect("written");
 
     let (archive, header) = CaptureArchive::open(folder.path(), &template).expect("a capture");
-    let record = archive
-        .record("a", &template)
-        .expect("readable")
-        .expect("done");
-    assert!(archive.record("b", &template).expect("readable").is_none());
+    let record = |name| archive.record(name, &template).expect("readable");
+    assert!(record("b").is_none());
+    let record = record("a").expect("done");
     let read = |header: &CaptureHeader| archive.displacements("a", header, &template);
     assert_eq!(read(&header).expect("readable"), displacements);
     // A skirt's clothed template has more vertices than the body.
     let mut joined = header.clone();
     joined.clothed.rest.push(P3::origin());
     assert_eq!(read(&joined).expect("readable"), displacements);
-    let mut damaged = header.clone();
-    damaged.outfit.cloth.parts[0].nodes.push(u32::MAX);
-    archive.write_header(&damaged).expect("written");
-    let refused = archive
-        .header(&template)
-        .expect_err("a vertex out of range");
-    assert!(refused.to_string().contains("parts[0].nodes"), "{refused}");
-    let mut damaged = header.clone();
-    damaged.outfit.atlases[0].uv[0] = [0.5, 1.5];
-    archive.write_header(&damaged).expect("written");
-    let refused = archive.header(&template).expect_err("beside the image");
-    assert!(refused.to_string().contains("atlases[0].uv"), "{refused}");
+    let refused = |damage: &dyn Fn(&mut CapturedOutfit), field: &str| {
+        let mut damaged = header.clone();
+        damage(&mut damaged.outfit);
+        archive.write_header(&damaged).expect("written");
+        let fault = archive.header(&template).expect_err("damaged");
+        assert!(fault.to_string().contains(field), "{fault}");
+    };
+    refused(&|o| o.cloth.parts[0].nodes.push(u32::MAX), "parts[0].nodes");
+    refused(&|o| o.atlases[0].uv[0] = [0.5, 1.5], "atlases[0].uv");
     let textures = archive.textures(&header).expect("readable");
-    let state = (header.clothed, record.body);
-    let mut resumed =
-        OutfitCapture::resume(template, CaptureConfig::default(), header.outfit, state)
-            .expect("a capture")
-            .with_textures(textures);
+    let (config, outfit) = (OutfitCaptureConfig::default(), header.outfit);
+    let mut resumed = OutfitCapture::resume(template, config, outfit, header.clothed, record.body)
+        .expect("a capture")
+        .with_textures(textures);
     let again = resumed.frame(&scans[1]).expect("captured");
     assert_eq!(again.labels, second.labels);
-    for (a, b) in again.garments.iter().zip(&second.garments) {
-        let worst = a
-            .iter()
-            .zip(b)
-            .map(|(p, q)| (p - q).norm())
-            .fold(0.0, f32::max);
-        assert!(worst < 1e-5, "{worst}");
-    }
+    let moved = worst(&again.garments, &second.garments);
+    assert!(moved < 1e-5, "{moved}");
     assert_eq!(resumed.textures(), whole.textures());
 }
 
@@ -204,17 +181,14 @@ fn mean_change(a: &FrameCapture, b: &FrameCapture) -> f64 {
 
 #[test]
 fn skipping_is_counted_and_changes_garments_by_less_than_a_tenth_of_a_millimetre() {
-    let template = embedded::template();
     let scans = [0.6, 0.7].map(|yaw| TestScan::new(yaw, BLUE, GREY).scan());
     let captured = |without_skips| {
-        let config = CaptureConfig {
+        let mut capture = capture(OutfitCaptureConfig {
             without_skips,
-            ..CaptureConfig::default()
-        };
-        let mut capture = OutfitCapture::new(template.clone(), config).expect("a capture");
-        scans
-            .each_ref()
-            .map(|scan| capture.frame(scan).expect("captured"))
+            ..OutfitCaptureConfig::default()
+        });
+        let frame = |scan| capture.frame(scan).expect("captured");
+        scans.each_ref().map(frame)
     };
     let (whole, some) = (captured(true), captured(false));
     // Nothing is skipped in the first scan.
@@ -232,18 +206,14 @@ fn skipping_is_counted_and_changes_garments_by_less_than_a_tenth_of_a_millimetre
         assert!(counts.settled > 0 && counts.solved > 0, "{report:?}");
     }
     for frame in [&whole[0], &whole[1], &some[0]] {
-        let counts = [frame.report.vertices, frame.report.alignment.vertices];
-        assert!(
-            counts
-                .iter()
-                .all(|c| c.settled == 0 && c.unseen == 0 && c.solved > 0)
-        );
+        for counts in [frame.report.vertices, frame.report.alignment.vertices] {
+            assert!(counts.settled == 0 && counts.unseen == 0 && counts.solved > 0);
+        }
     }
 }
 
 #[test]
 fn an_unchanged_scan_repeats_what_its_capture_would_give() {
-    let template = embedded::template();
     let scans = [0.6, 0.7].map(|yaw| TestScan::new(yaw, BLUE, GREY).scan());
     let mut noisy = scans[1].clone();
     for (k, p) in noisy.points.iter_mut().enumerate() {
@@ -253,7 +223,7 @@ fn an_unchanged_scan_repeats_what_its_capture_would_give() {
     let mut recoloured = scans[1].clone();
     recoloured.colors[0] = [1, 2, 3];
     assert!(!recoloured.is_unchanged(&scans[1]));
-    let mut capture = OutfitCapture::new(template, CaptureConfig::default()).expect("a capture");
+    let mut capture = capture(OutfitCaptureConfig::default());
     capture.frame(&scans[0]).expect("captured");
     let second = capture.frame(&scans[1]).expect("captured");
     let third = capture.frame(&noisy).expect("captured");
@@ -264,15 +234,11 @@ fn an_unchanged_scan_repeats_what_its_capture_would_give() {
 
 #[test]
 fn several_scans_give_one_shape_and_a_minimal_scan_overrides_them() {
-    let template = embedded::template();
     let truths = [0.6, 0.7, 0.8].map(|yaw| TestScan::new(yaw, BLUE, GREY));
     let scans = truths.each_ref().map(TestScan::scan);
-    let mut capture =
-        OutfitCapture::new(template.clone(), CaptureConfig::default()).expect("a capture");
-    scans[1..]
-        .iter()
-        .for_each(|s| capture.add_shape_scan(s.clone()));
-    let frame = capture.frame(&scans[0]).expect("captured");
+    let mut several = capture(OutfitCaptureConfig::default());
+    (1..3).for_each(|k| several.add_shape_scan(scans[k].clone()));
+    let frame = several.frame(&scans[0]).expect("captured");
     let off = mean_distance(&frame.undressed.vertices, &truths[0].body);
     assert!(off < 0.008, "body under cloth: {off:.4} m");
 
@@ -280,11 +246,10 @@ fn several_scans_give_one_shape_and_a_minimal_scan_overrides_them() {
         coefficients: vec![0.7, -0.4, 0.6],
         ..BodyShape::default()
     };
-    let config = CaptureConfig {
+    let mut capture = capture(OutfitCaptureConfig {
         minimal: Some(shape.clone()),
-        ..CaptureConfig::default()
-    };
-    let mut capture = OutfitCapture::new(template, config).expect("a capture");
+        ..OutfitCaptureConfig::default()
+    });
     let known = capture.frame(&scans[0]).expect("captured");
     assert_eq!(known.undressed.body.shape, shape);
     let less = mean_distance(&known.undressed.vertices, &truths[0].body);

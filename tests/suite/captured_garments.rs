@@ -7,7 +7,7 @@ use tryon::clothcap::align::find_frame;
 use tryon::clothcap::archive::{CaptureArchive, CaptureHeader, FrameDisplacements, FrameRecord};
 use tryon::clothcap::scan::BodyScan;
 use tryon::clothcap::segment::{LabelConfig, Slot};
-use tryon::clothcap::{CaptureConfig, OutfitCapture};
+use tryon::clothcap::{OutfitCapture, OutfitCaptureConfig};
 use tryon::dressing::{DressOptions, FitProbe, GarmentSource, dress_all};
 use tryon::formats::scan::ScanMesh;
 use tryon::garment::{Material, Size};
@@ -35,9 +35,9 @@ fn capture(folder: &Path) {
         slots: Some(vec![Slot::Top, Slot::Bottom]),
         ..LabelConfig::default()
     };
-    let config = CaptureConfig {
+    let config = OutfitCaptureConfig {
         labels,
-        ..CaptureConfig::default()
+        ..OutfitCaptureConfig::default()
     };
     let mut job = OutfitCapture::new(template.clone(), config).expect("a job");
     job.start_at(start);

@@ -10,7 +10,7 @@ use tryon::clothcap::archive::FrameDisplacements;
 use tryon::clothcap::scan::{BodyScan, ScanFrame};
 use tryon::clothcap::segment::{LabelConfig, Slot};
 use tryon::clothcap::{
-    BodyDresser, CaptureConfig, CaptureError, OutfitCapture, ScanSegmenter, SegmentedScan,
+    BodyDresser, CaptureError, OutfitCapture, OutfitCaptureConfig, ScanSegmenter, SegmentedScan,
     population,
 };
 use tryon::formats::scan::{ScanMesh, read_scan};
@@ -226,7 +226,8 @@ fn coordinates_and_colours_that_are_not_numbers_are_counted_or_refused() {
             let scan = read_scan(&path).expect("readable");
             let found = find_frame(&template, &scan).and_then(|(frame, start)| {
                 let scan = BodyScan::new(&scan, &frame)?;
-                let mut capture = OutfitCapture::new(template.clone(), CaptureConfig::default())?;
+                let mut capture =
+                    OutfitCapture::new(template.clone(), OutfitCaptureConfig::default())?;
                 capture.start_at(start);
                 capture.frame(&scan)
             });
@@ -493,7 +494,7 @@ fn a_dress_is_one_garment_around_both_legs() {
     let (frame, start) = find_frame(&template, &file).expect("a person");
     let scan = BodyScan::new(&file, &frame).expect("a scan");
     let mut capture =
-        OutfitCapture::new(template.clone(), CaptureConfig::default()).expect("capture");
+        OutfitCapture::new(template.clone(), OutfitCaptureConfig::default()).expect("capture");
     capture.start_at(start);
     let captured = capture.frame(&scan).expect("a dress");
     let outfit = capture.outfit().expect("an outfit");

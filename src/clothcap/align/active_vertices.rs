@@ -2,12 +2,10 @@
 
 use super::quadratic::QuadraticEnergy;
 use crate::CaptureError;
+use crate::settings::SurfaceFitSettings;
 use serde::{Deserialize, Serialize};
 use tryon_geometry::math::P3;
 use tryon_geometry::mesh::Csr;
-
-/// Share of the vertices up to which they are solved apart. More are solved faster with all others, by factorisation.
-const SOME: f64 = 0.5;
 
 /// Counts of vertices over the iterations of a fit.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -32,8 +30,7 @@ impl std::ops::AddAssign for VertexCounts {
 #[derive(Debug)]
 pub(crate) struct ActiveVertices<'a> {
     neighbours: &'a Csr,
-    /// Motion in an iteration up to which a vertex counts as settled, metres; 0 solves all in each.
-    settled: f32,
+    settings: &'a SurfaceFitSettings,
     is_active: Vec<bool>,
     /// Scan points pull at it.
     is_seen: Vec<bool>,
@@ -43,13 +40,12 @@ pub(crate) struct ActiveVertices<'a> {
 }
 
 impl<'a> ActiveVertices<'a> {
-    /// All vertices active; `neighbours` are those along the edges, `settled` is the motion in an iteration up to which a
-    /// vertex is held, metres; 0 solves all in each.
-    pub(crate) fn new(neighbours: &'a Csr, settled: f32) -> Self {
+    /// All vertices active; `neighbours` are those along the edges.
+    pub(crate) fn new(neighbours: &'a Csr, settings: &'a SurfaceFitSettings) -> Self {
         let n = neighbours.rows();
         Self {
             neighbours,
-            settled,
+            settings,
             is_active: vec![true; n],
             is_seen: vec![false; n],
             is_waiting: vec![false; n],
@@ -64,9 +60,6 @@ impl<'a> ActiveVertices<'a> {
     }
 
     /// Moves the active vertices to the positions of least energy, metres; the mean motion of all.
-    ///
-    /// # Errors
-    /// [`CaptureError::Solve`].
     pub(crate) fn solve(
         &mut self,
         energy: &mut QuadraticEnergy,
@@ -81,11 +74,11 @@ impl<'a> ActiveVertices<'a> {
             self.is_waiting.fill(false);
             self.counts.solved += n;
         } else {
-            energy.minimise_some(x, &some, stage)?;
+            energy.minimise_some(x, &some, self.settings.stop(), stage)?;
             self.count(&some);
         }
         let motions: Vec<f32> = x.iter().zip(&before).map(|(a, b)| (a - b).norm()).collect();
-        let moves = |v: usize| motions[v] > self.settled;
+        let moves = |v: usize| motions[v] > self.settings.still;
         let rows =
             (0..n).map(|v| moves(v) || self.neighbours.row(v).iter().any(|w| moves(*w as usize)));
         self.is_active = rows.collect();
@@ -93,9 +86,6 @@ impl<'a> ActiveVertices<'a> {
     }
 
     /// Solves the unseen vertices that were held, after the last iteration.
-    ///
-    /// # Errors
-    /// [`CaptureError::Solve`].
     pub(crate) fn finish(
         &mut self,
         energy: &mut QuadraticEnergy,
@@ -103,9 +93,8 @@ impl<'a> ActiveVertices<'a> {
         stage: &'static str,
     ) -> Result<(), CaptureError> {
         let n = self.is_waiting.len();
-        let some: Vec<u32> = (0..n as u32)
-            .filter(|v| self.is_waiting[*v as usize])
-            .collect();
+        let some = (0..n as u32).filter(|v| self.is_waiting[*v as usize]);
+        let some: Vec<u32> = some.collect();
         if some.is_empty() {
             return Ok(());
         }
@@ -116,7 +105,7 @@ impl<'a> ActiveVertices<'a> {
             return Ok(());
         }
         self.counts.solved += some.len();
-        energy.minimise_some(x, &some, stage)
+        energy.minimise_some(x, &some, self.settings.stop(), stage)
     }
 
     /// Vertices so far.
@@ -125,7 +114,8 @@ impl<'a> ActiveVertices<'a> {
     }
 
     fn solves_all(&self, some: usize) -> bool {
-        self.settled <= 0.0 || some as f64 > SOME * self.is_active.len() as f64
+        let most = self.settings.most_apart * self.is_active.len() as f64;
+        self.settings.still <= 0.0 || some as f64 > most
     }
 
     fn is_solved(&self, v: u32) -> bool {

@@ -1,14 +1,15 @@
 //! Single-mesh alignment of a sequence: the first scan gives the clothed template, later ones are coupled to it.
 
 use super::active_vertices::VertexCounts;
-use super::arms::search_lost_arms;
-use super::free_surface::{FreeSurface, SurfaceFitConfig};
+use super::arms::LostArms;
+use super::free_surface::FreeSurface;
 use super::legs::leg_topology;
-use super::model_fit::{AlignedBody, FitStage, ModelFit};
+use super::model_fit::{AlignedBody, ModelFit, PosedBody};
 use super::scan_pairing::{QueryCounts, SurfaceMatch};
-use super::start::{Start, find_person};
+use super::start::{Start, search_person};
 use crate::CaptureError;
 use crate::scan::BodyScan;
+use crate::settings::{AlignmentSettings, SurfaceStage};
 use crate::topology::{ClothTemplate, LegTopology};
 use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
@@ -17,18 +18,8 @@ use std::sync::Arc;
 use tryon_body::{BoneTransforms, Pose, PosedSkin, Template};
 use tryon_geometry::math::{P3, Rigid, World};
 
-/// BodyScan points in a fit of the model.
-const SAMPLES: usize = 6000;
-/// BodyScan points in a fit of a later pose.
-const LATER_SAMPLES: usize = 3000;
-/// Stages of a later pose.
-const LATER: [FitStage; 2] = [FitStage::posed(0.08, 8), FitStage::posed(0.03, 10)];
 /// Turns about the vertical between two scans that are tried, radians.
 const TURNS: [f64; 3] = [FRAC_PI_2, PI, -FRAC_PI_2];
-/// Mean robust distance in the last pose below which no turn is tried, metres: a back is farther from a front.
-const FACING: f64 = 0.02;
-/// Mean robust distance above which a later pose is lost and the person is searched anew, metres.
-const LOST: f64 = 0.03;
 
 /// Alignment of one scan.
 #[derive(Clone, Debug)]
@@ -81,19 +72,11 @@ pub struct ClothedTemplate {
     pub legs: LegTopology,
 }
 
-/// Body in a later scan.
-struct LaterPose {
-    body: AlignedBody,
-    /// The person was searched from nothing.
-    searched: bool,
-    /// Turns about the vertical that were not tried.
-    turns_skipped: usize,
-}
-
 /// Aligns the scans of one subject in order.
 #[derive(Debug)]
 pub struct Aligner {
     template: Arc<Template>,
+    settings: AlignmentSettings,
     cloth: ClothTemplate,
     free: FreeSurface,
     clothed: Option<ClothedTemplate>,
@@ -110,10 +93,11 @@ impl Aligner {
     ///
     /// # Errors
     /// [`CaptureError::Solve`] for a template too large.
-    pub fn new(template: Arc<Template>) -> Result<Self, CaptureError> {
+    pub fn new(template: Arc<Template>, settings: AlignmentSettings) -> Result<Self, CaptureError> {
         Ok(Self {
             cloth: ClothTemplate::new(&template, LegTopology::Apart)?,
-            free: FreeSurface::new(&template)?,
+            free: FreeSurface::new(&template, settings.surface)?,
+            settings,
             template,
             clothed: None,
             start: None,
@@ -128,10 +112,11 @@ impl Aligner {
     /// As [`Aligner::new`].
     pub fn resume(
         template: Arc<Template>,
+        settings: AlignmentSettings,
         clothed: ClothedTemplate,
         last: AlignedBody,
     ) -> Result<Self, CaptureError> {
-        let mut out = Self::new(template)?;
+        let mut out = Self::new(template, settings)?;
         out.cut(clothed.legs)?;
         Ok(Self {
             clothed: Some(clothed),
@@ -144,7 +129,7 @@ impl Aligner {
     fn cut(&mut self, legs: LegTopology) -> Result<(), CaptureError> {
         if legs != self.cloth.legs() {
             self.cloth = ClothTemplate::new(&self.template, legs)?;
-            self.free = FreeSurface::new(self.cloth.template())?;
+            self.free = FreeSurface::new(self.cloth.template(), self.settings.surface)?;
         }
         Ok(())
     }
@@ -192,38 +177,37 @@ impl Aligner {
     }
 
     fn first(&mut self, scan: &BodyScan) -> Result<Alignment, CaptureError> {
-        let template = self.template.clone();
+        let (template, settings) = (self.template.clone(), self.settings);
         let start = match self.start.take() {
             Some(start) => start,
-            None => find_person(&template, scan)?,
+            None => search_person(&template, scan, &settings)?,
         };
-        let mut fit = ModelFit::new(&template, scan, SAMPLES);
+        let mut fit = ModelFit::new(&template, scan, settings.samples, &settings.model);
         let mut body = start.body;
-        for stage in &FitStage::FINE {
+        for stage in &settings.fine {
             fit.run(&mut body, stage)?;
         }
-        if search_lost_arms(&template, scan, &mut fit, &mut body)? {
-            for stage in &FitStage::FINE[1..] {
+        let arms = LostArms::new(&template, scan, &settings.arms);
+        if arms.search(&mut fit, &mut body)? {
+            for stage in &settings.fine[1..] {
                 fit.run(&mut body, stage)?;
             }
         }
-        self.cut(leg_topology(&template, scan, &body)?)?;
+        self.cut(leg_topology(&template, scan, &body, &settings.legs)?)?;
         let template = self.cloth.template().clone();
-        let mut fit = ModelFit::new(&template, scan, SAMPLES);
-        let out = self.released(scan, &mut fit, body, &SurfaceFitConfig::default())?;
+        let mut fit = ModelFit::new(&template, scan, settings.samples, &settings.model);
+        let report = AlignmentReport {
+            searched: true,
+            ..AlignmentReport::default()
+        };
+        let out = self.released(scan, &mut fit, body, report, &settings.surface.first)?;
         let nodes = 0..out.surface.len();
         self.clothed = Some(ClothedTemplate {
             legs: self.cloth.legs(),
             rest: PosedSkin::new(&template, &out.bones).unpose(nodes, &out.surface),
             body: out.body.clone(),
         });
-        Ok(Alignment {
-            report: AlignmentReport {
-                searched: true,
-                ..out.report
-            },
-            ..out
-        })
+        Ok(out)
     }
 
     /// Stage 2: pose by the clothed template, then the free surface coupled to it (eq. 9, 10).
@@ -233,18 +217,12 @@ impl Aligner {
         clothed: &ClothedTemplate,
     ) -> Result<Alignment, CaptureError> {
         let template = self.cloth.template().clone();
-        let fit = ModelFit::new(&template, scan, LATER_SAMPLES).with_clothed(&clothed.rest);
-        let mut fit = fit.with_starts(self.skips);
-        let found = self.later_pose(scan, clothed, &mut fit)?;
-        let out = self.released(scan, &mut fit, found.body, &SurfaceFitConfig::later())?;
-        Ok(Alignment {
-            report: AlignmentReport {
-                searched: found.searched,
-                turns_skipped: found.turns_skipped,
-                ..out.report
-            },
-            ..out
-        })
+        let settings = self.settings;
+        let fit = ModelFit::new(&template, scan, settings.later_samples, &settings.model);
+        let mut fit = fit.with_clothed(&clothed.rest).with_starts(self.skips);
+        let mut report = AlignmentReport::default();
+        let body = self.later_pose(scan, clothed, &mut fit, &mut report)?;
+        self.released(scan, &mut fit, body, report, &settings.surface.later)
     }
 
     /// Pose by the clothed template, from that of the last scan.
@@ -253,44 +231,44 @@ impl Aligner {
         scan: &BodyScan,
         clothed: &ClothedTemplate,
         fit: &mut ModelFit<'_>,
-    ) -> Result<LaterPose, CaptureError> {
+        report: &mut AlignmentReport,
+    ) -> Result<AlignedBody, CaptureError> {
+        let settings = &self.settings;
         let last = &self.last.as_ref().unwrap_or(&clothed.body).pose;
-        let (mut body, turns_skipped) = self.turned(last, clothed, fit);
-        for stage in &LATER {
+        let mut body = self.turned(last, clothed, fit, report);
+        for stage in &settings.later {
             fit.run(&mut body, stage)?;
         }
-        if search_lost_arms(&self.template, scan, fit, &mut body)? {
-            fit.run(&mut body, &LATER[1])?;
+        let arms = LostArms::new(&self.template, scan, &settings.arms);
+        if arms.search(fit, &mut body)? {
+            fit.run(&mut body, &settings.later[1])?;
         }
-        let searched = !(fit.error(&body) < LOST);
-        if searched {
-            let found = find_person(&self.template, scan)?;
+        report.searched = !(fit.error(&body) < settings.lost);
+        if report.searched {
+            let found = search_person(&self.template, scan, settings)?;
             let mut other = AlignedBody {
                 pose: found.body.pose,
                 shape: clothed.body.shape.clone(),
             };
-            for stage in &LATER {
+            for stage in &settings.later {
                 fit.run(&mut other, stage)?;
             }
             if fit.error(&other) < fit.error(&body) {
                 body = other;
             }
         }
-        Ok(LaterPose {
-            body,
-            searched,
-            turns_skipped,
-        })
+        Ok(body)
     }
 
     /// Body of the first scan in the last pose, turned about the vertical to the direction that fits best: a back looks
-    /// much like a front to closest points. Beside it the number of turns that were not tried.
+    /// much like a front to closest points.
     fn turned(
         &self,
         last: &Pose<World>,
         clothed: &ClothedTemplate,
         fit: &mut ModelFit<'_>,
-    ) -> (AlignedBody, usize) {
+        report: &mut AlignmentReport,
+    ) -> AlignedBody {
         let pelvis = last.root.point(&self.template.skeleton().joints()[0].rest);
         let turned = |turn: f64| {
             let axis = Vector3::y() * turn;
@@ -305,8 +283,9 @@ impl Aligner {
         };
         let mut best = turned(0.0);
         let mut least = fit.error(&best);
-        if self.skips && least < FACING {
-            return (best, TURNS.len());
+        if self.skips && least < self.settings.facing {
+            report.turns_skipped = TURNS.len();
+            return best;
         }
         for turn in TURNS {
             let other = turned(turn);
@@ -315,7 +294,7 @@ impl Aligner {
                 (best, least) = (other, error);
             }
         }
-        (best, 0)
+        best
     }
 
     /// Releases the surface from the model.
@@ -324,16 +303,15 @@ impl Aligner {
         scan: &BodyScan,
         fit: &mut ModelFit<'_>,
         body: AlignedBody,
-        config: &SurfaceFitConfig,
+        report: AlignmentReport,
+        stages: &[SurfaceStage],
     ) -> Result<Alignment, CaptureError> {
         let model_error = fit.error(&body);
-        let (model, bones) = fit.posed(&body);
-        let mut surface = model.clone();
-        let mut config = config.clone();
-        if !self.skips {
-            (config.settled, config.still) = (0.0, 0.0);
-        }
-        let report = self.free.run(scan, &model, &mut surface, &config)?;
+        let PosedBody { vertices, bones } = fit.posed(&body);
+        let (model, mut surface) = (vertices.clone(), vertices);
+        // The first scan makes the clothed template; nothing is skipped in it.
+        let skips = self.skips && self.last.is_some();
+        let fitted = self.free.run(scan, &model, &mut surface, stages, skips)?;
         let points = scan.points.len().max(1) as f64;
         Ok(Alignment {
             body,
@@ -343,12 +321,11 @@ impl Aligner {
             matches: self.free.matches().to_vec(),
             report: AlignmentReport {
                 model_error,
-                surface_error: report.error,
-                explained: report.paired as f64 / points,
-                searched: false,
-                queries: report.queries,
-                vertices: report.vertices,
-                turns_skipped: 0,
+                surface_error: fitted.error,
+                explained: fitted.paired as f64 / points,
+                queries: fitted.queries,
+                vertices: fitted.vertices,
+                ..report
             },
         })
     }

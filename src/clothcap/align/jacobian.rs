@@ -1,14 +1,13 @@
 //! Normal equations of matched scan points in pose and shape, from the few unknowns that move each point.
 
-use nalgebra::{DMatrix, DVector, Vector3};
+use crate::dense_equations::DenseEquations;
+use nalgebra::Vector3;
 use tryon_body::Template;
 use tryon_geometry::math::V3;
 use tryon_geometry::mesh::Face;
 use tryon_geometry::par::{self, Par};
 use tryon_tracking::registration::Dof;
 
-/// Weight of tangential beside normal distances: limbs move along themselves only by it.
-const TANGENTIAL: f64 = 0.05;
 /// Matches in one partial sum.
 const CHUNK: usize = 256;
 
@@ -19,7 +18,7 @@ pub(super) struct Match {
     pub(super) corners: [f32; 3],
     pub(super) point: Vector3<f64>,
     pub(super) normal: Vector3<f64>,
-    /// BodyScan point minus surface point.
+    /// Scan point minus surface point.
     pub(super) residual: Vector3<f64>,
     pub(super) weight: f64,
 }
@@ -28,6 +27,8 @@ pub(super) struct Match {
 /// centimetre while a joint turns by a radian, limbs by 25 cm.
 pub(super) struct JacobianRows<'a> {
     pub(super) template: &'a Template,
+    /// Weight of tangential beside normal distances.
+    pub(super) tangential: f64,
     /// Unknowns of the pose.
     pub(super) dofs: &'a [Dof],
     /// Displacement of each vertex per unit of each unknown of the shape.
@@ -54,11 +55,11 @@ impl MatchRows {
     }
 
     /// Adds Jᵀ J, upper triangle, and Jᵀ r.
-    fn add_to(&self, (h, g): (&mut DMatrix<f64>, &mut DVector<f64>)) {
+    fn add_to(&self, sum: &mut DenseEquations) {
         let dot = |a: &[f64; 3], b: &[f64; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
         for (k, (&i, a)) in self.unknowns.iter().zip(&self.columns).enumerate() {
-            g[i] += dot(a, &self.residuals);
-            let mut column = h.column_mut(i);
+            sum.g[i] += dot(a, &self.residuals);
+            let mut column = sum.h.column_mut(i);
             for (&j, b) in self.unknowns[..=k].iter().zip(&self.columns) {
                 column[j] += dot(a, b);
             }
@@ -68,30 +69,23 @@ impl MatchRows {
 
 impl JacobianRows<'_> {
     /// Jᵀ W J and Jᵀ W r over all matches in `n` unknowns, summed in a fixed order.
-    pub(super) fn normal_equations(
-        &self,
-        matches: &[Match],
-        n: usize,
-    ) -> (DMatrix<f64>, DVector<f64>) {
+    pub(super) fn normal_equations(&self, matches: &[Match], n: usize) -> DenseEquations {
         let good: Vec<&Match> = matches.iter().filter(|m| m.weight > 0.0).collect();
         let mut sums = Vec::new();
         let chunks = good.len().div_ceil(CHUNK);
         par::map_into(Par::Rayon, chunks, 1, &mut sums, |c| {
             let some = &good[c * CHUNK..((c + 1) * CHUNK).min(good.len())];
-            let (mut h, mut g) = (DMatrix::<f64>::zeros(n, n), DVector::<f64>::zeros(n));
+            let mut sum = DenseEquations::zeros(n);
             let mut rows = MatchRows::default();
             for m in some {
                 self.fill(m, &mut rows);
-                rows.add_to((&mut h, &mut g));
+                rows.add_to(&mut sum);
             }
-            Some((h, g))
+            Some(sum)
         });
-        let mut total = (DMatrix::zeros(n, n), DVector::zeros(n));
-        for (h, g) in sums.into_iter().flatten() {
-            total.0 += h;
-            total.1 += g;
-        }
-        total.0.fill_lower_triangle_with_upper_triangle();
+        let mut total = DenseEquations::zeros(n);
+        sums.iter().flatten().for_each(|sum| total += sum);
+        total.h.fill_lower_triangle_with_upper_triangle();
         total
     }
 
@@ -104,8 +98,8 @@ impl JacobianRows<'_> {
             Vector3::y()
         };
         let t = m.normal.cross(&across).normalize();
-        let along = (m.weight * (1.0 + TANGENTIAL)).sqrt();
-        let tangential = (m.weight * TANGENTIAL).sqrt();
+        let along = (m.weight * (1.0 + self.tangential)).sqrt();
+        let tangential = (m.weight * self.tangential).sqrt();
         let axes = [
             m.normal * along,
             t * tangential,

@@ -6,7 +6,7 @@ use crate::CaptureError;
 use nalgebra::{Matrix3, Vector3};
 use std::sync::Arc;
 use tryon_geometry::linear::{
-    BlockJacobi, CgAccuracy, Factor, LinearError, StopCriterion, SymbolicFactor, SymmetricPattern,
+    BlockJacobi, Factor, LinearError, StopCriterion, SymbolicFactor, SymmetricPattern,
     conjugate_gradient,
 };
 use tryon_geometry::math::P3;
@@ -15,12 +15,6 @@ use tryon_geometry::par::Par;
 
 /// Weight of an edge of an even mesh in the Dirichlet energy of a displacement: the cotangent of 60°.
 pub(crate) const EVEN_EDGE: f64 = 0.577;
-
-/// End of an iteration on some vertices: the residual beside that before, and the most products.
-const STOP: StopCriterion = StopCriterion {
-    accuracy: CgAccuracy::Residual(0.01),
-    iterations: 100,
-};
 
 /// Weighted sum of a few vertices.
 #[derive(Clone, Debug, PartialEq)]
@@ -41,16 +35,6 @@ impl Stencil {
             factors: vec![1.0, -1.0],
             weight,
         }
-    }
-    /// Value at some positions, metres.
-    pub fn at(&self, x: &[P3]) -> [f64; 3] {
-        let mut sum = [0.0; 3];
-        for (v, f) in self.vertices.iter().zip(&self.factors) {
-            for (s, c) in sum.iter_mut().zip(x[*v as usize].iter()) {
-                *s += f * f64::from(*c);
-            }
-        }
-        sum
     }
 }
 
@@ -74,15 +58,14 @@ pub(crate) struct Pull {
     pub(crate) target: P3,
 }
 
-/// Storage of the entries of one stencil: lower triangle in the order of pairs (0,0), (1,0), (1,1), (2,0) …
-type Slots = Vec<u32>;
-
 /// Σ w ‖Σ f x − target‖² with a fixed set of stencils and faces.
 #[derive(Debug)]
 pub struct QuadraticEnergy {
-    stencils: Vec<(Stencil, Slots)>,
-    faces: Vec<[u32; 6]>,
-    corners: Vec<Face>,
+    stencils: Vec<Stencil>,
+    faces: Vec<Face>,
+    /// Storage of the entries of each stencil, then of each face: lower triangle in the order of pairs (0,0), (1,0), (1,1),
+    /// (2,0) …
+    slots: Vec<Vec<u32>>,
     pattern: Arc<SymmetricPattern>,
     /// Columns of each row beside its diagonal, and where their values are stored.
     rows: [Csr; 2],
@@ -101,47 +84,32 @@ impl QuadraticEnergy {
         stencils: Vec<Stencil>,
         faces: &[Face],
     ) -> Result<Self, CaptureError> {
+        let own = stencils.iter().map(|s| s.vertices.as_slice());
+        let terms: Vec<&[u32]> = own.chain(faces.iter().map(|f| f.as_slice())).collect();
         let mut pairs = Vec::new();
-        let stencil_vertices = stencils.iter().map(|s| s.vertices.as_slice());
-        for all in stencil_vertices.chain(faces.iter().map(|f| f.as_slice())) {
+        for all in &terms {
             for (k, &a) in all.iter().enumerate() {
-                pairs.extend(all[..k].iter().map(|&b| (a, b)));
+                pairs.extend(all[..k].iter().map(|&b| (a.min(b), a.max(b))));
             }
         }
-        pairs
-            .iter_mut()
-            .for_each(|p| *p = (p.0.min(p.1), p.0.max(p.1)));
         pairs.sort_unstable();
         pairs.dedup();
-        let entries = pairs.iter().copied();
-        let pattern = Arc::new(SymmetricPattern::new(vertices, entries).map_err(fault)?);
-        let slots = |all: &[u32]| -> Slots {
-            let mut out = Vec::new();
-            for (k, &a) in all.iter().enumerate() {
-                let slot = |&b: &u32| pattern.slot(a, b).unwrap_or_default() as u32;
-                out.extend(all[..=k].iter().map(slot));
-            }
-            out
-        };
-        let face_slots = |f: &Face| -> [u32; 6] {
-            let all = slots(f);
-            std::array::from_fn(|k| all.get(k).copied().unwrap_or_default())
+        let pattern = SymmetricPattern::new(vertices, pairs.iter().copied()).map_err(fault)?;
+        let pattern = Arc::new(pattern);
+        let slots = |all: &&[u32]| {
+            let slot = |a: u32, b: u32| pattern.slot(a, b).unwrap_or_default() as u32;
+            let row = |k: usize| all[..=k].iter().map(move |b| slot(all[k], *b));
+            (0..all.len()).flat_map(row).collect()
         };
         Ok(Self {
-            faces: faces.iter().map(face_slots).collect(),
-            corners: faces.to_vec(),
-            stencils: stencils
-                .into_iter()
-                .map(|s| {
-                    let at = slots(&s.vertices);
-                    (s, at)
-                })
-                .collect(),
+            slots: terms.iter().map(slots).collect(),
+            faces: faces.to_vec(),
             rows: rows(&pattern, &pairs),
             values: vec![0.0; pattern.entries()],
             rhs: vec![[0.0; 3]; vertices],
             factor: Factor::new(SymbolicFactor::new(pattern.clone()).map_err(fault)?),
             pattern,
+            stencils,
         })
     }
 
@@ -153,14 +121,13 @@ impl QuadraticEnergy {
 
     /// Adds a stencil with its target, metres; its weight is multiplied by `scale`.
     pub fn add_stencil(&mut self, index: usize, scale: f64, target: [f64; 3]) {
-        let (stencil, slots) = &self.stencils[index];
+        let stencil = &self.stencils[index];
         let weight = stencil.weight * scale;
-        let mut slot = slots.iter();
-        for (k, (v, f)) in stencil.vertices.iter().zip(&stencil.factors).enumerate() {
-            for g in &stencil.factors[..=k] {
-                if let Some(s) = slot.next() {
-                    self.values[*s as usize] += weight * f * g;
-                }
+        let (vertices, factors) = (&stencil.vertices, &stencil.factors);
+        let mut slots = self.slots[index].iter();
+        for (k, (v, f)) in vertices.iter().zip(factors).enumerate() {
+            for (g, s) in factors[..=k].iter().zip(&mut slots) {
+                self.values[*s as usize] += weight * f * g;
             }
             for (r, t) in self.rhs[*v as usize].iter_mut().zip(target) {
                 *r += weight * f * t;
@@ -170,17 +137,14 @@ impl QuadraticEnergy {
 
     /// Pulls a point of a face to `target`, metres.
     pub fn add_face_point(&mut self, face: u32, corners: [f32; 3], weight: f64, target: &P3) {
-        let c = corners.map(f64::from);
-        let s = &self.faces[face as usize];
-        let mut slot = 0;
-        for k in 0..3 {
-            for l in 0..=k {
-                self.values[s[slot] as usize] += weight * c[k] * c[l];
-                slot += 1;
+        let factors = corners.map(f64::from);
+        let mut slots = self.slots[self.stencils.len() + face as usize].iter();
+        for (k, (v, f)) in self.faces[face as usize].iter().zip(factors).enumerate() {
+            for (g, s) in factors[..=k].iter().zip(&mut slots) {
+                self.values[*s as usize] += weight * f * g;
             }
-            let rhs = &mut self.rhs[self.corners[face as usize][k] as usize];
-            for (r, t) in rhs.iter_mut().zip(target.iter()) {
-                *r += weight * c[k] * f64::from(*t);
+            for (r, t) in self.rhs[*v as usize].iter_mut().zip(target.iter()) {
+                *r += weight * f * f64::from(*t);
             }
         }
     }
@@ -203,7 +167,7 @@ impl QuadraticEnergy {
             }
             PullPlace::Face(face, corners) => {
                 self.add_face_point(face, corners, pull.weight, &pull.target);
-                self.corners[face as usize]
+                self.faces[face as usize]
             }
         }
     }
@@ -213,21 +177,19 @@ impl QuadraticEnergy {
     /// # Errors
     /// [`CaptureError::Solve`] if a vertex has no term or the numbers are not finite.
     pub fn minimise(&mut self, stage: &'static str) -> Result<Vec<P3>, CaptureError> {
-        let why = |why: String| CaptureError::Solve { stage, why };
-        self.factor
-            .refactor(&self.values)
-            .map_err(|e| why(e.to_string()))?;
+        let fault = |why: String| CaptureError::solve(stage, why);
+        let refactored = self.factor.refactor(&self.values);
+        refactored.map_err(|e| fault(e.to_string()))?;
         let mut x = self.rhs.clone();
         self.factor.solve(&mut x);
         let out: Vec<P3> = x.iter().map(|p| P3::from(p.map(|c| c as f32))).collect();
         match out.iter().position(|p| !p.iter().all(|c| c.is_finite())) {
-            Some(vertex) => Err(why(format!("vertex {vertex} is not finite"))),
+            Some(vertex) => Err(fault(format!("vertex {vertex} is not finite"))),
             None => Ok(out),
         }
     }
 
-    /// Moves some vertices of `x` to the positions of least energy, metres, all others held: to a hundredth of the residual,
-    /// from where they are.
+    /// Moves some vertices of `x` to the positions of least energy, metres, all others held, from where they are.
     ///
     /// # Errors
     /// [`CaptureError::Solve`] if the numbers are not finite.
@@ -235,24 +197,20 @@ impl QuadraticEnergy {
         &self,
         x: &mut [P3],
         some: &[u32],
+        stop: StopCriterion,
         stage: &'static str,
     ) -> Result<(), CaptureError> {
         let mut system = self.restricted(x, some);
         let mut inverse = BlockJacobi::from_inverse(std::mem::take(&mut system.inverse));
         let mut moves = vec![Vector3::zeros(); some.len()];
         let apply = |from: &[Vector3<f64>], to: &mut [Vector3<f64>]| system.multiply(from, to);
-        conjugate_gradient(
-            apply,
-            &mut inverse,
-            &system.rhs,
-            &mut moves,
-            (Par::Seq, STOP),
-        );
+        let run = (Par::Seq, stop);
+        conjugate_gradient(apply, &mut inverse, &system.rhs, &mut moves, run);
         for (v, by) in some.iter().zip(&moves) {
             let moved = x[*v as usize].cast::<f64>() + by;
             if !moved.iter().all(|c| c.is_finite()) {
                 let why = format!("vertex {v} is not finite");
-                return Err(CaptureError::Solve { stage, why });
+                return Err(CaptureError::solve(stage, why));
             }
             x[*v as usize] = moved.cast();
         }
@@ -281,8 +239,8 @@ impl QuadraticEnergy {
             }
             out.ends.push(out.entries.len());
             out.diagonal.push(diagonal);
-            out.inverse
-                .push(Matrix3::from_diagonal_element(1.0 / diagonal));
+            let inverse = Matrix3::from_diagonal_element(1.0 / diagonal);
+            out.inverse.push(inverse);
             out.rhs.push(left);
         }
         out
@@ -325,38 +283,31 @@ fn rows(pattern: &SymmetricPattern, pairs: &[(u32, u32)]) -> [Csr; 2] {
 }
 
 fn fault(e: LinearError) -> CaptureError {
-    CaptureError::Solve {
-        stage: "sparse system",
-        why: e.to_string(),
-    }
+    CaptureError::solve("sparse system", e)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::settings::SurfaceFitSettings;
 
     /// Two triangles; the minimum of a convex quadratic has a vanishing gradient by differences.
     #[test]
     fn minimum_has_no_slope() {
         let faces = [[0, 1, 2], [2, 1, 3]];
-        let stencils = vec![
-            Stencil::edge([0, 1], 0.7),
-            Stencil::edge([1, 3], 0.2),
-            Stencil {
-                vertices: vec![0, 1, 2],
-                factors: vec![1.0, -2.0, 1.0],
-                weight: 0.4,
-            },
-        ];
+        let bend = Stencil {
+            vertices: vec![0, 1, 2],
+            factors: vec![1.0, -2.0, 1.0],
+            weight: 0.4,
+        };
+        let stencils = vec![Stencil::edge([0, 1], 0.7), Stencil::edge([1, 3], 0.2), bend];
         let targets = [[0.1, 0.0, 0.3], [-0.2, 0.4, 0.0], [0.05; 3]];
         let pulls = [
             (0, [0.2, 0.3, 0.5], 2.0, P3::new(1.0, 2.0, 0.0)),
             (1, [0.0, 0.4, 0.6], 1.5, P3::new(0.0, -1.0, 0.5)),
         ];
         let mut energy = QuadraticEnergy::new(4, stencils.clone(), &faces).expect("in range");
-        for (k, t) in targets.iter().enumerate() {
-            energy.add_stencil(k, 1.0, *t);
-        }
+        (0..3).for_each(|k| energy.add_stencil(k, 1.0, targets[k]));
         for (face, corners, weight, target) in &pulls {
             energy.add_face_point(*face, *corners, *weight, target);
         }
@@ -365,33 +316,27 @@ mod tests {
         let value = |x: &[P3]| -> f64 {
             let mut sum = 0.0;
             for (s, t) in stencils.iter().zip(&targets) {
-                let at = s.at(x);
+                let terms = s.vertices.iter().zip(&s.factors);
+                let at: Vector3<f64> = terms.map(|(v, f)| x[*v as usize].coords.cast() * *f).sum();
                 sum += s.weight * (0..3).map(|d| (at[d] - t[d]).powi(2)).sum::<f64>();
             }
             for (face, c, w, t) in &pulls {
                 let f: Face = faces[*face as usize];
-                let p: nalgebra::Vector3<f32> =
-                    (0..3).map(|k| x[f[k] as usize].coords * c[k]).sum();
+                let p: Vector3<f32> = (0..3).map(|k| x[f[k] as usize].coords * c[k]).sum();
                 sum += w * f64::from((p - t.coords).norm_squared());
             }
-            sum + x
-                .iter()
-                .map(|p| 0.05 * f64::from(p.coords.norm_squared()))
-                .sum::<f64>()
+            let anchored = x.iter().map(|p| 0.05 * f64::from(p.coords.norm_squared()));
+            sum + anchored.sum::<f64>()
         };
         let least = value(&x);
-        for v in 0..4 {
-            for d in 0..3 {
+        for (v, d) in (0..12).map(|k| (k / 3, k % 3)) {
+            let moved = |by: f32| {
                 let mut moved = x.clone();
-                moved[v][d] += 0.01;
-                let mut back = x.clone();
-                back[v][d] -= 0.01;
-                let slope = (value(&moved) - value(&back)) / 0.02;
-                assert!(
-                    slope.abs() < 1e-4 && value(&moved) > least,
-                    "{v} {d}: {slope}"
-                );
-            }
+                moved[v][d] += by;
+                value(&moved)
+            };
+            let slope = (moved(0.01) - moved(-0.01)) / 0.02;
+            assert!(slope.abs() < 1e-4 && moved(0.01) > least, "{v} {d}");
         }
     }
 
@@ -406,24 +351,26 @@ mod tests {
             energy.add_vertex(v, 0.3, &P3::new(v as f32, 1.0, -1.0));
         }
         let least = energy.minimise("test").expect("definite");
-        let some = [2, 3, 4, 8, 9];
+        let (some, stop) = ([2, 3, 4, 8, 9], SurfaceFitSettings::default().stop());
         let mut x = least.clone();
         some.iter().for_each(|v| x[*v as usize].y += 0.5);
         for _ in 0..4 {
-            energy.minimise_some(&mut x, &some, "test").expect("solved");
+            let solved = energy.minimise_some(&mut x, &some, stop, "test");
+            solved.expect("solved");
         }
         let off = x.iter().zip(&least).map(|(a, b)| (a - b).norm());
         assert!(off.fold(0.0, f32::max) < 1e-5);
         x[2].y = f32::NAN;
-        assert!(energy.minimise_some(&mut x, &some, "test").is_err());
+        assert!(energy.minimise_some(&mut x, &some, stop, "test").is_err());
     }
 
     #[test]
     fn faults_are_named() {
         assert!(QuadraticEnergy::new(2, vec![Stencil::edge([0, 5], 1.0)], &[]).is_err());
         let mut empty = QuadraticEnergy::new(2, Vec::new(), &[]).expect("in range");
+        let fault = empty.minimise("test");
         assert!(matches!(
-            empty.minimise("test"),
+            fault,
             Err(CaptureError::Solve { stage: "test", .. })
         ));
     }

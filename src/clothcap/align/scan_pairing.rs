@@ -2,47 +2,14 @@
 //! surface around them hardly moves, and start the next search where it does.
 
 use super::quadratic::{Pull, PullPlace};
-use crate::scan::BodyScan;
+use crate::scan::{BodyScan, largest};
+use crate::settings::SurfaceFitSettings;
 use serde::{Deserialize, Serialize};
-use tryon_geometry::math::{P3, V3};
+use tryon_geometry::math::P3;
 use tryon_geometry::mesh::{Csr, Face, vertex_normals};
 use tryon_geometry::par::{self, Par};
 use tryon_geometry::spatial::{Bvh, SurfacePoint, WarmQuery};
 use tryon_tracking::registration::GemanMcClure;
-
-/// Smallest cosine between normals of a pair.
-const NORMALS: f32 = 0.2;
-/// Motion of a face up to which points keep it, metres: closest points change by less than by noise. At 1 mm hems of
-/// low contrast are 1 mm worse.
-pub(crate) const SETTLED: f32 = 5e-4;
-
-/// Normal of a scan point.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct ScanNormal {
-    /// Unit vector; zero if unknown.
-    pub(crate) normal: V3,
-    /// Points outwards; else of either sign.
-    pub(crate) oriented: bool,
-}
-
-impl ScanNormal {
-    /// Agrees with a unit normal of the surface to the least cosine; an unknown normal agrees with any.
-    pub(crate) fn agrees(&self, surface: &V3, least: f32) -> bool {
-        let cos = surface.dot(&self.normal);
-        let cos = if self.oriented { cos } else { cos.abs() };
-        self.normal == V3::zeros() || cos >= least
-    }
-}
-
-impl BodyScan {
-    /// Normal of a point.
-    pub(crate) fn normal(&self, i: usize) -> ScanNormal {
-        ScanNormal {
-            normal: self.normals[i],
-            oriented: self.oriented,
-        }
-    }
-}
 
 /// Points of a scan that are paired with a surface.
 #[derive(Clone, Copy, Debug)]
@@ -96,16 +63,9 @@ pub struct SurfaceMatch {
 }
 
 impl SurfaceMatch {
-    /// Corner of the triangle with the largest share, 0 to 2.
-    pub fn nearest_corner(&self) -> usize {
-        let [a, b, c] = self.corners;
-        if a >= b && a >= c {
-            0
-        } else if b >= c {
-            1
-        } else {
-            2
-        }
+    /// Vertex of the triangle with the largest share.
+    pub fn nearest_vertex(&self, faces: &[Face]) -> u32 {
+        faces[self.face as usize][largest(self.corners)]
     }
 }
 
@@ -161,6 +121,8 @@ pub(crate) struct ScanPairing {
     around: Csr,
     /// Points are compared with normals interpolated over faces, else with those of the faces.
     is_smooth: bool,
+    /// Smallest cosine between normals of a pair.
+    least: f32,
     /// Motion of a face since it was found up to which it is kept, metres; 0 keeps none.
     settled: f32,
     /// Searches start at the last face: of two faces equally near, another one may be found.
@@ -181,6 +143,7 @@ impl ScanPairing {
             tree: Bvh::new(faces, rest),
             around: Csr::of_faces(rest.len(), faces),
             is_smooth,
+            least: 0.0,
             settled: 0.0,
             is_warm: false,
             kept: Vec::new(),
@@ -190,10 +153,10 @@ impl ScanPairing {
         }
     }
 
-    /// Begins a scan of so many points; `settled` is the motion up to which a face is kept, metres; at 0 each search is
-    /// made from nothing.
-    pub(crate) fn begin(&mut self, points: usize, settled: f32) {
-        (self.settled, self.is_warm) = (settled, settled > 0.0);
+    /// Begins a scan of so many points. Where no face is kept, each search is made from nothing.
+    pub(crate) fn begin(&mut self, points: usize, settings: &SurfaceFitSettings) {
+        (self.least, self.settled) = (settings.normals, settings.settled);
+        self.is_warm = self.settled > 0.0;
         self.kept.clear();
         self.kept.resize(points, None);
         self.travel.clear();
@@ -248,19 +211,16 @@ impl ScanPairing {
             vertex_normals(Par::Rayon, surface, faces, &self.around, &mut normals);
         }
         let kernel = GemanMcClure { sigma };
-        let normal = |at: &SurfacePoint| match self.is_smooth {
-            true => {
-                let face = self.tree.faces()[at.face as usize];
-                Some(
-                    (0..3)
-                        .map(|k| normals[face[k] as usize] * at.weights[k])
-                        .sum(),
-                )
+        let normal = |at: &SurfacePoint| {
+            if !self.is_smooth {
+                return self.tree.unit_normal(surface, at.face);
             }
-            false => self.tree.unit_normal(surface, at.face),
+            let face = self.tree.faces()[at.face as usize];
+            let corners = face.iter().zip(at.weights);
+            Some(corners.map(|(v, w)| normals[*v as usize] * w).sum())
         };
         let matched = |i: usize, at: &SurfacePoint| {
-            let agrees = normal(at).is_some_and(|own| points.scan.normal(i).agrees(&own, NORMALS));
+            let agrees = normal(at).is_some_and(|own| points.scan.agrees(i, &own, self.least));
             let e2 = f64::from(at.distance * at.distance);
             SurfaceMatch {
                 face: at.face,
@@ -308,7 +268,7 @@ impl ScanPairing {
         points: &ScanPoints<'_>,
         surface: &[P3],
     ) -> Option<(SurfacePoint, FaceSearch)> {
-        let (p, normal, kept) = (&points.scan.points[i], points.scan.normal(i), self.kept[i]);
+        let (p, kept) = (&points.scan.points[i], self.kept[i]);
         if let Some(k) = kept
             && self.travel[k.face as usize] - k.travel < self.settled
         {
@@ -321,7 +281,7 @@ impl ScanPairing {
             vertices: surface,
             around: &self.around,
         };
-        let descend = |f| query.descend(p, f, |own| normal.agrees(own, NORMALS));
+        let descend = |f| query.descend(p, f, |own| points.scan.agrees(i, own, self.least));
         if let Some(point) = near.and_then(descend) {
             return Some((point, FaceSearch::Near));
         }
@@ -346,18 +306,5 @@ impl ScanPairing {
     /// Queries so far.
     pub(crate) fn counts(&self) -> QueryCounts {
         self.counts
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn normals_of_either_sign_and_unknown_ones_agree() {
-        let up = V3::z();
-        let agrees = |normal, oriented| ScanNormal { normal, oriented }.agrees(&up, 0.2);
-        assert!(agrees(up, true) && !agrees(-up, true) && agrees(-up, false));
-        assert!(!agrees(V3::x(), false) && agrees(V3::zeros(), true));
     }
 }

@@ -1,22 +1,20 @@
 //! One shape of a subject from several scans, each with a pose of its own (section 5.4): the poses are eliminated from the
 //! normal equations of each scan, and what is left is summed.
 
-use super::body_equations::BodyEquations;
 use super::jacobian::Match;
-use super::model_fit::{AlignedBody, CONVERGED, FitStage, ModelFit, Prior};
-use super::shape_unknowns::ShapeUnknowns;
+use super::model_fit::{AlignedBody, ModelFit, Prior, STAGE};
+use super::unknowns::ShapeUnknowns;
 use crate::CaptureError;
-use nalgebra::{DMatrix, DVector};
+use crate::dense_equations::DenseEquations;
+use crate::settings::{FitStage, ModelFitSettings};
 use tryon_body::{Pose, Template};
 use tryon_geometry::math::World;
 use tryon_tracking::registration::GemanMcClure;
 
 /// Fits one shape to several scans; `bodies` are start and result, their shapes equal in the end. Shapes `[scans]`.
-///
-/// # Errors
-/// [`CaptureError::Solve`].
 pub(crate) fn fit_shared_shape(
     template: &Template,
+    settings: &ModelFitSettings,
     fits: &mut [ModelFit<'_>],
     bodies: &mut [AlignedBody],
     stage: &FitStage,
@@ -25,7 +23,7 @@ pub(crate) fn fit_shared_shape(
         return Ok(());
     };
     let mut shape = first.shape.clone();
-    let unknowns = ShapeUnknowns::new(template, &mut shape, true);
+    let unknowns = ShapeUnknowns::new(template, settings, &mut shape, true);
     bodies.iter_mut().for_each(|b| b.shape = shape.clone());
     let starts: Vec<Pose<World>> = bodies.iter().map(|b| b.pose.clone()).collect();
     let kernel = GemanMcClure { sigma: stage.sigma };
@@ -35,11 +33,8 @@ pub(crate) fn fit_shared_shape(
             fit.place(body);
             all.push(fit.matches(&kernel));
         }
-        let n = unknowns.len();
-        let mut sum = BodyEquations {
-            h: DMatrix::zeros(n, n),
-            g: DVector::zeros(n),
-        };
+        let n = unknowns.all.len();
+        let mut sum = DenseEquations::zeros(n);
         let mut updates = Vec::new();
         for (k, (fit, matches)) in fits.iter().zip(&all).enumerate() {
             let prior = Prior {
@@ -48,18 +43,18 @@ pub(crate) fn fit_shared_shape(
                 freedom: stage.freedom,
             };
             let system = fit.system(&bodies[k], &prior, matches);
-            let (reduced, back) = system.eliminate_pose(n)?;
-            sum.h += reduced.h;
-            sum.g += reduced.g;
+            let (reduced, back) = system.eliminate(n, settings, STAGE)?;
+            sum += &reduced;
             updates.push(back);
         }
-        sum.add_shape_prior(&bodies[0].shape, &unknowns);
-        let step = sum.solve()?;
+        unknowns.add_prior(&mut sum, &bodies[0].shape);
+        sum.damp(settings);
+        let step = sum.solve(STAGE)?;
         let mut moved = 0.0f64;
         for ((fit, body), back) in fits.iter().zip(&mut *bodies).zip(&updates) {
             moved = moved.max(fit.update(body, &unknowns, &back.with(&step)));
         }
-        if moved < CONVERGED {
+        if moved < settings.converged {
             break;
         }
     }

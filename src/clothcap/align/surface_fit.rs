@@ -5,16 +5,11 @@ use super::active_vertices::{ActiveVertices, VertexCounts};
 use super::quadratic::{Pull, QuadraticEnergy, Stencil};
 use super::scan_pairing::QueryCounts;
 use crate::CaptureError;
+use crate::settings::SurfaceFitSettings;
 use std::ops::Range;
 use std::sync::Arc;
 use tryon_geometry::math::P3;
 use tryon_geometry::mesh::{Csr, Face, edges};
-
-/// Mean motion of the vertices below which a fit to a scan ends, metres.
-pub(crate) const CONVERGED: f32 = 5e-5;
-/// Motion of a vertex in an iteration up to which it is held in the next, metres: what it would still move is a
-/// fraction of that.
-pub(crate) const STILL: f32 = 1e-4;
 
 /// Terms beside the pulls, and the end of the iterations.
 #[derive(Clone, Copy, Debug)]
@@ -29,10 +24,8 @@ pub(crate) struct SurfaceTerms<'a> {
     pub(crate) anchor: f64,
     /// Most iterations.
     pub(crate) iterations: usize,
-    /// Mean motion of the vertices below which they end, metres; 0 makes all.
-    pub(crate) converged: f32,
-    /// Motion of a vertex in an iteration up to which it is held in the next, metres; 0 solves all in each.
-    pub(crate) still: f32,
+    /// Solves.
+    pub(crate) settings: &'a SurfaceFitSettings,
 }
 
 /// Report of a fit.
@@ -65,9 +58,6 @@ pub(crate) struct SurfaceFit {
 impl SurfaceFit {
     /// Prepares the system of so many vertices; `edge` is the coupling of an edge, `groups` are further stencils whose
     /// values vanish at best.
-    ///
-    /// # Errors
-    /// [`CaptureError::Solve`] for a mesh too large.
     pub(crate) fn new(
         stage: &'static str,
         vertices: usize,
@@ -94,9 +84,6 @@ impl SurfaceFit {
     }
 
     /// Moves the vertices `x` of the surface, metres. `pair` gives the pulls at a surface, or `None` to end.
-    ///
-    /// # Errors
-    /// [`CaptureError::Solve`], and those of `pair`.
     pub(crate) fn run(
         &mut self,
         terms: &SurfaceTerms<'_>,
@@ -104,7 +91,7 @@ impl SurfaceFit {
         mut pair: impl FnMut(&[P3]) -> Result<Option<Vec<Pull>>, CaptureError>,
     ) -> Result<SurfaceFitReport, CaptureError> {
         let neighbours = self.neighbours.clone();
-        let mut active = ActiveVertices::new(&neighbours, terms.still);
+        let mut active = ActiveVertices::new(&neighbours, terms.settings);
         let mut iterations = 0;
         while iterations < terms.iterations {
             let Some(pulls) = pair(x)? else {
@@ -115,7 +102,7 @@ impl SurfaceFit {
             self.anchor(terms);
             active.see(pulls.iter().flat_map(|p| self.energy.add_pull(p)));
             iterations += 1;
-            if active.solve(&mut self.energy, x, self.stage)? < terms.converged {
+            if active.solve(&mut self.energy, x, self.stage)? < terms.settings.converged {
                 break;
             }
         }

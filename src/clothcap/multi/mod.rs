@@ -4,5 +4,7 @@ pub(crate) mod part;
 pub(crate) mod part_fit;
 pub(crate) mod trim;
 
+pub use crate::settings::PartFitConfig;
 pub use part::{ClothPart, MultiCloth, Ring};
-pub use part_fit::{PartFit, PartFitConfig, PartFitReport, PartScan};
+pub use part_fit::{LabelledScan, PartFit, PartFitReport, PartScan};
+pub(super) use trim::grow;

@@ -1,17 +1,12 @@
 //! Parts of the multi-cloth template: faces of one garment, the body vertex of each of its vertices, and its boundary rings.
 
 use crate::segment::{BodyRegion, Labelling, Slot};
+use crate::settings::PartCutSettings;
 use crate::topology::{ClothTemplate, LegTopology};
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, BTreeSet};
-use tryon_body::Template;
 use tryon_body::parts::BodySide;
 use tryon_geometry::mesh::{Face, UnionFind, boundary_edges, boundary_loops};
-
-/// Least number of faces of a piece; smaller ones are errors of the labels.
-pub(super) const LEAST_FACES: usize = 40;
-/// Least number of vertices of a ring that gets a name; smaller ones are holes.
-const LEAST_RING: usize = 12;
 
 /// Boundary ring of a part.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -54,85 +49,113 @@ pub struct MultiCloth {
 impl MultiCloth {
     /// Cuts the template along the labels of its nodes.
     pub fn new(cloth: &ClothTemplate, labelling: &Labelling) -> Self {
-        let template = cloth.template();
-        let regions = BodyRegion::of_vertices(template);
-        let garments = labelling.slots.iter().enumerate();
-        let parts = garments
-            .filter(|(_, s)| s.is_garment())
-            .filter_map(|(l, slot)| {
-                let own: Vec<bool> = labelling
-                    .labels
-                    .iter()
-                    .map(|x| usize::from(*x) == l)
-                    .collect();
-                let hidden: Vec<bool> = (0..own.len())
-                    .map(|v| !own[v] && *slot == Slot::Under && is_under(labelling, &regions, v))
-                    .collect();
-                ClothPart::new(cloth, (l as u8, *slot), &own, &hidden)
-            });
+        let cutter = PartCutter {
+            cloth,
+            labelling,
+            regions: BodyRegion::of_vertices(cloth.template()),
+            settings: PartCutSettings::default(),
+        };
+        let garments = 0..labelling.slots.len();
         Self {
-            parts: parts.collect(),
+            parts: garments.filter_map(|label| cutter.part(label)).collect(),
             legs: cloth.legs(),
         }
     }
 }
 
-/// A node under the outer garment that the inner one is completed with: torso only.
-fn is_under(labelling: &Labelling, regions: &[BodyRegion], v: usize) -> bool {
-    let outer = labelling.slots[usize::from(labelling.labels[v])];
-    outer == Slot::Top && (regions[v].is_torso() || regions[v] == BodyRegion::UpperArm)
+/// Cut of a labelled template.
+struct PartCutter<'a> {
+    cloth: &'a ClothTemplate,
+    labelling: &'a Labelling,
+    regions: Vec<BodyRegion>,
+    settings: PartCutSettings,
 }
 
-impl ClothPart {
-    /// Part of the nodes `own` and `hidden`; `None` if too small.
-    fn new(
-        cloth: &ClothTemplate,
-        (label, slot): (u8, Slot),
-        own: &[bool],
-        hidden: &[bool],
-    ) -> Option<Self> {
-        let within = |v: u32| own[v as usize] || hidden[v as usize];
-        // A face with two corners within belongs to the part: its third corner joins it, so that parts meet without gaps.
-        let template = cloth.template();
-        let mut faces: Vec<Face> = template
-            .mesh()
-            .faces()
-            .iter()
-            .filter(|f| f.iter().filter(|v| within(**v)).count() >= 2)
-            .copied()
-            .collect();
-        drop_small_pieces(&mut faces, LEAST_FACES);
-        drop_fans(&mut faces);
-        if faces.len() < LEAST_FACES {
+impl PartCutter<'_> {
+    /// A node under the outer garment that the inner one is completed with: torso only.
+    fn is_under(&self, v: usize) -> bool {
+        let outer = self.labelling.slots[usize::from(self.labelling.labels[v])];
+        let region = self.regions[v];
+        outer == Slot::Top && (region.is_torso() || region == BodyRegion::UpperArm)
+    }
+
+    /// Part of a label; `None` for skin and hair, and if it is too small.
+    fn part(&self, label: usize) -> Option<ClothPart> {
+        let slot = self.labelling.slots[label];
+        if !slot.is_garment() {
             return None;
         }
-        let nodes: BTreeSet<u32> = faces.iter().flatten().copied().collect();
-        let nodes: Vec<u32> = nodes.into_iter().collect();
-        let mut index = vec![u32::MAX; own.len()];
-        for (i, v) in nodes.iter().enumerate() {
-            index[*v as usize] = i as u32;
+        let labels = &self.labelling.labels;
+        let is_own = |v: usize| usize::from(labels[v]) == label;
+        let is_hidden = |v| !is_own(v) && slot == Slot::Under && self.is_under(v);
+        let hidden: Vec<bool> = (0..labels.len()).map(is_hidden).collect();
+        let within = |v: u32| is_own(v as usize) || hidden[v as usize];
+        // A face with two corners within belongs to the part: its third corner joins it, so that parts meet without gaps.
+        let is_part = |f: &&Face| f.iter().filter(|v| within(**v)).count() >= 2;
+        let all = self.cloth.template().mesh().faces().iter();
+        let mut faces: Vec<Face> = all.filter(is_part).copied().collect();
+        drop_small_pieces(&mut faces, self.settings.least_faces);
+        drop_fans(&mut faces);
+        if faces.len() < self.settings.least_faces {
+            return None;
         }
-        let local: Vec<Face> = faces.iter().map(|f| f.map(|v| index[v as usize])).collect();
-        let rings = boundary_loops(&local)
-            .into_iter()
-            .map(|vertices| Ring {
-                name: ring_name(template, &nodes, &vertices),
-                vertices,
-            })
-            .collect();
-        let mut part = Self {
+        let (nodes, local) = compact(&faces);
+        let rings = boundary_loops(&local).into_iter().map(|vertices| Ring {
+            name: self.ring_name(&nodes, &vertices),
+            vertices,
+        });
+        let mut part = ClothPart {
             slot,
-            label,
+            label: label as u8,
+            rings: rings.collect(),
             hidden: nodes.iter().map(|v| hidden[*v as usize]).collect(),
-            below: nodes.iter().map(|v| cloth.body_vertex(*v)).collect(),
+            below: nodes.iter().map(|v| self.cloth.body_vertex(*v)).collect(),
             nodes,
             faces: local,
-            rings,
         };
         part.tell_apart();
         Some(part)
     }
 
+    /// Name of a ring by the body below it.
+    fn ring_name(&self, nodes: &[u32], ring: &[u32]) -> String {
+        use BodyRegion::*;
+        if ring.len() < self.settings.least_ring {
+            return "hole".into();
+        }
+        let template = self.cloth.template();
+        let mut counts = [0; BodyRegion::ALL.len()];
+        let (mut left, mut right) = (0, 0);
+        for v in ring {
+            let node = nodes[*v as usize] as usize;
+            counts[self.regions[node] as usize] += 1;
+            match template.parts().side(template.weights().dominant(node)) {
+                Some(BodySide::Left) => left += 1,
+                Some(BodySide::Right) => right += 1,
+                None => {}
+            }
+        }
+        let count = |r: &BodyRegion| counts[*r as usize];
+        let is_most = |n: usize| n as f64 > self.settings.one_side * ring.len() as f64;
+        let one_side = is_most(left.max(right));
+        let side = if left > right { "left" } else { "right" };
+        // Of regions with the same count the last one in their order.
+        let all = BodyRegion::ALL.into_iter();
+        match all.max_by_key(|r| (count(r), *r as u8)) {
+            Some(Head | Neck) => "neck".into(),
+            Some(UpperArm | Forearm | Hand) if one_side => format!("{side}_sleeve"),
+            Some(Chest) if one_side && is_most(count(&UpperArm) + count(&Chest)) => {
+                format!("{side}_armhole")
+            }
+            Some(Chest) => "neck".into(),
+            Some(Abdomen | Pelvis) => "waist".into(),
+            Some(Thigh | Shin | Foot) if one_side => format!("{side}_leg"),
+            _ => "hem".into(),
+        }
+    }
+}
+
+impl ClothPart {
     /// Numbers rings of the same name.
     fn tell_apart(&mut self) {
         let mut seen: BTreeMap<String, usize> = BTreeMap::new();
@@ -144,6 +167,15 @@ impl ClothPart {
             }
         }
     }
+}
+
+/// Vertices that some faces use, ascending, and the faces over these.
+pub(super) fn compact(faces: &[Face]) -> (Vec<u32>, Vec<Face>) {
+    let used: BTreeSet<u32> = faces.iter().flatten().copied().collect();
+    let used: Vec<u32> = used.into_iter().collect();
+    let index = |v: u32| used.binary_search(&v).unwrap_or_default() as u32;
+    let local = faces.iter().map(|f| f.map(index)).collect();
+    (used, local)
 }
 
 /// Leaves out connected pieces with fewer than `least` faces.
@@ -167,56 +199,12 @@ pub(super) fn drop_fans(faces: &mut Vec<Face>) {
         for [a, _] in boundary_edges(faces) {
             *out.entry(a).or_default() += 1;
         }
-        let pinched: BTreeSet<u32> = out
-            .into_iter()
-            .filter(|(_, n)| *n > 1)
-            .map(|(v, _)| v)
-            .collect();
+        let pinched = out.into_iter().filter(|(_, n)| *n > 1).map(|(v, _)| v);
+        let pinched: BTreeSet<u32> = pinched.collect();
         if pinched.is_empty() {
             return;
         }
         faces.retain(|f| !f.iter().any(|v| pinched.contains(v)));
-    }
-}
-
-/// Name of a ring by the body below it.
-fn ring_name(template: &Template, nodes: &[u32], ring: &[u32]) -> String {
-    use BodyRegion::*;
-    if ring.len() < LEAST_RING {
-        return "hole".into();
-    }
-    let regions = BodyRegion::of_vertices(template);
-    let mut counts: BTreeMap<u8, usize> = BTreeMap::new();
-    let (mut left, mut right) = (0, 0);
-    for v in ring {
-        let node = nodes[*v as usize] as usize;
-        *counts.entry(regions[node] as u8).or_default() += 1;
-        match template.parts().side(template.weights().dominant(node)) {
-            Some(BodySide::Left) => left += 1,
-            Some(BodySide::Right) => right += 1,
-            None => {}
-        }
-    }
-    let most = counts.iter().max_by_key(|(_, n)| **n).map(|(r, _)| *r);
-    let share = |all: &[BodyRegion]| {
-        let own = all.iter().filter_map(|r| counts.get(&(*r as u8)));
-        own.sum::<usize>() as f64 / ring.len() as f64
-    };
-    let one_side = left.max(right) as f64 > 0.8 * ring.len() as f64;
-    let side = if left > right { "left" } else { "right" };
-    let region = [
-        Head, Neck, Chest, Abdomen, Pelvis, UpperArm, Forearm, Hand, Thigh, Shin, Foot,
-    ]
-    .into_iter()
-    .find(|r| Some(*r as u8) == most);
-    match region {
-        Some(Head | Neck) => "neck".into(),
-        Some(UpperArm | Forearm | Hand) if one_side => format!("{side}_sleeve"),
-        Some(Chest) if one_side && share(&[UpperArm, Chest]) > 0.8 => format!("{side}_armhole"),
-        Some(Chest) => "neck".into(),
-        Some(Abdomen | Pelvis) => "waist".into(),
-        Some(Thigh | Shin | Foot) if one_side => format!("{side}_leg"),
-        _ => "hem".into(),
     }
 }
 
@@ -225,36 +213,32 @@ mod tests {
     use super::*;
     use tryon_body::embedded;
 
-    /// Labels by region: shirt on torso and upper arms, trousers on hips and thighs.
-    fn labelling(template: &Template) -> Labelling {
-        let labels = BodyRegion::of_vertices(template)
-            .iter()
-            .map(|r| match r {
-                BodyRegion::Chest | BodyRegion::Abdomen | BodyRegion::UpperArm => 2,
-                BodyRegion::Pelvis | BodyRegion::Thigh => 3,
-                _ => 0,
-            })
-            .collect();
-        Labelling {
+    /// Shirt on torso and upper arms, trousers on hips and thighs.
+    fn cloth() -> MultiCloth {
+        let template = embedded::template();
+        let label = |r: &BodyRegion| match r {
+            BodyRegion::Chest | BodyRegion::Abdomen | BodyRegion::UpperArm => 2,
+            BodyRegion::Pelvis | BodyRegion::Thigh => 3,
+            _ => 0,
+        };
+        let regions = BodyRegion::of_vertices(&template);
+        let labelling = Labelling {
             slots: vec![Slot::Skin, Slot::Hair, Slot::Top, Slot::Bottom],
-            labels,
+            labels: regions.iter().map(label).collect(),
             appearances: vec![None; 4],
             energy: 0.0,
             is_top_long: false,
-        }
+        };
+        let surface = ClothTemplate::new(&template, LegTopology::Apart);
+        MultiCloth::new(&surface.expect("the body itself"), &labelling)
     }
 
     #[test]
     fn rings_are_found_and_named() {
-        let template = embedded::template();
-        let cloth = ClothTemplate::new(&template, LegTopology::Apart).expect("the body itself");
-        let cloth = MultiCloth::new(&cloth, &labelling(&template));
+        let cloth = cloth();
         let names = |k: usize| {
-            let mut all: Vec<&str> = cloth.parts[k]
-                .rings
-                .iter()
-                .map(|r| r.name.as_str())
-                .collect();
+            let rings = cloth.parts[k].rings.iter();
+            let mut all: Vec<&str> = rings.map(|r| r.name.as_str()).collect();
             all.sort_unstable();
             all
         };
@@ -264,9 +248,7 @@ mod tests {
 
     #[test]
     fn boundary_vertices_lie_on_one_ring_once() {
-        let template = embedded::template();
-        let cloth = ClothTemplate::new(&template, LegTopology::Apart).expect("the body itself");
-        for part in MultiCloth::new(&cloth, &labelling(&template)).parts {
+        for part in cloth().parts {
             let mut all: Vec<u32> = part.rings.iter().flat_map(|r| r.vertices.clone()).collect();
             let count = all.len();
             assert_eq!(count, boundary_edges(&part.faces).len());

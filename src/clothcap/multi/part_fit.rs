@@ -3,59 +3,14 @@
 use super::part::ClothPart;
 use crate::CaptureError;
 use crate::align::{
-    CONVERGED, EVEN_EDGE, Pull, PullPlace, ScanPairing, ScanPoints, Stencil, SurfaceFit,
-    SurfaceFitReport, SurfaceTerms, explained,
+    EVEN_EDGE, Pull, PullPlace, ScanPairing, ScanPoints, Stencil, SurfaceFit, SurfaceFitReport,
+    SurfaceTerms, explained,
 };
 use crate::scan::BodyScan;
+use crate::settings::{PartFitConfig, SurfaceFitSettings};
 use tryon_geometry::math::{P3, V3};
 use tryon_geometry::mesh::{Csr, edges, face_normal};
 use tryon_geometry::spatial::PointTree;
-
-/// Smallest cosine between normals of neighbours across a boundary.
-const BESIDE: f32 = 0.7;
-/// Pull to the start beside the data's: settles what no term determines.
-const ANCHOR: f64 = 1e-4;
-/// Distance up to which a boundary point of the scan belongs to a ring, metres.
-const RING_REACH: f32 = 0.06;
-
-/// Weights of a part's energy; lengths whose squares weigh terms against data by area.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct PartFitConfig {
-    /// Width of the Geman–McClure kernel, metres.
-    pub sigma: f64,
-    /// Coupling length, metres (w_c of eq. 15).
-    pub coupling: f64,
-    /// Length of the Laplacian, metres (w_s).
-    pub laplacian: f64,
-    /// Weight of a boundary point beside a surface point (w_b). The paper's is 0.02 of the data's, per point.
-    pub boundary: f64,
-    /// Weight of boundary smoothness beside a surface point (w_a).
-    pub smoothness: f64,
-    /// Most iterations.
-    pub iterations: usize,
-    /// Most scan points in an iteration.
-    pub points: usize,
-    /// Motion of a face up to which the points on it keep it without a search, metres; 0 searches always.
-    pub settled: f32,
-    /// Motion of a vertex in an iteration up to which it is held in the next, metres; 0 solves all in each.
-    pub still: f32,
-}
-
-impl Default for PartFitConfig {
-    fn default() -> Self {
-        Self {
-            sigma: 0.03,
-            coupling: 0.012,
-            laplacian: 0.006,
-            boundary: 2.0,
-            smoothness: 2.0,
-            iterations: 8,
-            points: 15_000,
-            settled: 0.0,
-            still: 0.0,
-        }
-    }
-}
 
 /// Report of a fit.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -64,6 +19,19 @@ pub struct PartFitReport {
     pub surface: SurfaceFitReport,
     /// Mean distance of the scan's boundary points from the rings, metres; 0 without any.
     pub boundary_error: f64,
+}
+
+/// Scan with labels, from which the points of each part are taken.
+#[derive(Clone, Copy, Debug)]
+pub struct LabelledScan<'a> {
+    /// Scan.
+    pub scan: &'a BodyScan,
+    /// Its edges.
+    pub edges: &'a [[u32; 2]],
+    /// Label of each point.
+    pub labels: &'a [u8],
+    /// Vertex of the clothed template that each point may lie near: searches start there.
+    pub near: &'a [u32],
 }
 
 /// Scan points of one part.
@@ -78,20 +46,20 @@ pub struct PartScan {
 }
 
 impl PartScan {
-    /// Points with a label, and the middles of the scan's edges to other labels. `near` gives the vertex of the clothed
-    /// template that each point of the scan may lie near: searches start there.
-    pub fn new(
-        (scan, edges): (&BodyScan, &[[u32; 2]]),
-        (labels, near): (&[u8], &[u32]),
-        label: u8,
-    ) -> Self {
+    /// Points with a label, and the middles of the scan's edges to other labels; these have normals that agree to `beside`.
+    pub fn new(labelled: &LabelledScan<'_>, label: u8, beside: f32) -> Self {
+        let LabelledScan {
+            scan,
+            edges,
+            labels,
+            near,
+        } = *labelled;
         let own = |i: &usize| labels[*i] == label;
         let some: Vec<usize> = (0..scan.points.len()).filter(own).collect();
         let crosses = |e: &&[u32; 2]| {
             let [a, b] = e.map(|v| labels[v as usize] == label);
-            let [n, m] = e.map(|v| scan.normal(v as usize));
-            // Edges of a cloud also join an arm and the torso behind it.
-            a != b && (!scan.faces.is_empty() || m.agrees(&n.normal, BESIDE))
+            let [n, m] = e.map(|v| v as usize);
+            a != b && (!scan.faces.is_empty() || scan.agrees(m, &scan.normals[n], beside))
         };
         let middle = |e: &[u32; 2]| {
             let [a, b] = e.map(|v| scan.points[v as usize]);
@@ -109,27 +77,35 @@ impl PartScan {
             near: some.iter().map(|i| near[*i]).collect(),
         }
     }
-    /// Adds a pull of each ring vertex at `surface` to the mean of the boundary points nearest to it; their mean
-    /// distance, metres.
-    fn pull_rings(&self, ring: &[u32], surface: &[P3], weight: f64, pulls: &mut Vec<Pull>) -> f64 {
+
+    /// Pulls of the ring vertices at `surface` to the means of the boundary points within `reach` nearest to them, and the
+    /// mean distance of these, metres.
+    fn pull_rings(
+        &self,
+        ring: &[u32],
+        surface: &[P3],
+        weight: f64,
+        reach: f32,
+    ) -> (Vec<Pull>, f64) {
         let places: Vec<P3> = ring.iter().map(|v| surface[*v as usize]).collect();
         let tree = PointTree::new(&places);
         let mut sums = vec![(V3::zeros(), 0.0f32); ring.len()];
         let (mut total, mut count) = (0.0, 0.0);
         for p in &self.boundary {
-            if let Some((k, d)) = tree.nearest(p, RING_REACH) {
+            if let Some((k, d)) = tree.nearest(p, reach) {
                 sums[k].0 += p.coords;
                 sums[k].1 += 1.0;
                 total += f64::from(d.sqrt());
                 count += 1.0;
             }
         }
-        pulls.extend(ring.iter().zip(&sums).map(|(v, (sum, n))| Pull {
+        let pulls = ring.iter().zip(&sums).map(|(v, (sum, n))| Pull {
             at: PullPlace::Vertex(*v),
             weight: if *n > 0.0 { weight } else { 0.0 },
             target: P3::from(sum / n.max(1.0)),
-        }));
-        if count > 0.0 { total / count } else { 0.0 }
+        });
+        let mean = if count > 0.0 { total / count } else { 0.0 };
+        (pulls.collect(), mean)
     }
 }
 
@@ -151,10 +127,8 @@ impl PartFit {
     pub fn new(part: &ClothPart, rest: &[P3]) -> Result<Self, CaptureError> {
         let n = part.nodes.len();
         let neighbours = Csr::of_edges(n, &edges(&part.faces));
-        let ring: Vec<u32> = (part.rings.iter())
-            .flat_map(|r| &r.vertices)
-            .copied()
-            .collect();
+        let ring = part.rings.iter().flat_map(|r| &r.vertices);
+        let ring: Vec<u32> = ring.copied().collect();
         let mut on_ring = vec![false; n];
         ring.iter().for_each(|v| on_ring[*v as usize] = true);
         let laplacian = |v: u32| {
@@ -203,25 +177,24 @@ impl PartFit {
         let vertex = area / model.len().max(1) as f64;
         let count = scan.scan.points.len();
         let points = ScanPoints::of(&scan.scan, count.div_ceil(config.points.max(1)));
-        self.begin(scan, points.stride, config.settled);
+        self.begin(scan, points.stride, &config.fit);
         // A Laplacian of size δ on an even mesh bends like δ / h², so its weight is length⁴ / h⁴ by area.
         let bend = (config.laplacian * config.laplacian / vertex).powi(2) * vertex;
         let terms = SurfaceTerms {
             model,
             coupling: config.coupling,
             smoothness: &[bend, config.smoothness * vertex],
-            anchor: ANCHOR * vertex,
+            anchor: config.anchor * vertex,
             iterations: config.iterations,
-            converged: CONVERGED,
-            still: config.still,
+            settings: &config.fit,
         };
         let mut boundary_error = 0.0;
         let mut report = self.fit.run(&terms, surface, |x| {
             let matches = self.pairing.pair(&points, x, config.sigma);
-            let mut pulls = points.pulls(&matches, area).collect();
-            let weight = config.boundary * vertex;
-            boundary_error = scan.pull_rings(&self.ring, x, weight, &mut pulls);
-            Ok(Some(pulls))
+            let (rings, error) =
+                scan.pull_rings(&self.ring, x, config.boundary * vertex, config.ring_reach);
+            boundary_error = error;
+            Ok(Some(points.pulls(&matches, area).chain(rings).collect()))
         })?;
         (report.error, report.paired) =
             explained(&self.pairing.pair(&points, surface, config.sigma));
@@ -233,8 +206,8 @@ impl PartFit {
     }
 
     /// Starts searches at the faces near which the single mesh had the points, every `stride`-th of them.
-    fn begin(&mut self, scan: &PartScan, stride: usize, settled: f32) {
-        self.pairing.begin(scan.near.len(), settled);
+    fn begin(&mut self, scan: &PartScan, stride: usize, settings: &SurfaceFitSettings) {
+        self.pairing.begin(scan.near.len(), settings);
         for (i, node) in scan.near.iter().enumerate().step_by(stride) {
             if let Ok(v) = self.part.nodes.binary_search(node) {
                 self.pairing.start_around(i, v);

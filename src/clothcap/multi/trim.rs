@@ -1,70 +1,51 @@
 //! Trimming of a captured part into cloth that can be worn: narrow tabs cut off, hems smoothed, self-intersections removed.
 
-use super::part::{ClothPart, LEAST_FACES, drop_fans, drop_small_pieces};
+use super::part::{ClothPart, compact, drop_fans, drop_small_pieces};
+use crate::settings::PartCutSettings;
 use std::collections::BTreeSet;
 use tryon_geometry::math::P3;
 use tryon_geometry::mesh::smoothing::half_mean;
 use tryon_geometry::mesh::{Csr, Face, TriMesh, boundary_edges, edges};
 use tryon_geometry::spatial::intersections;
 
-/// Rings of vertices that are taken off and put on again: tabs of twice as many rings (1 cm each) are cut off.
-const OPENING: usize = 2;
-/// A piece with fewer faces than one part in so many of the whole is no cloth of its own.
-const LEAST_SHARE: usize = 20;
-/// Rounds of smoothing along the hems; boundaries of labels run along edges of the template, in teeth of an edge.
-const HEM_ROUNDS: usize = 12;
-/// Rings that follow the smoothed hems, and rounds of their smoothing.
-const NEAR_HEM: [usize; 2] = [3, 6];
-/// Most rounds of smoothing around self-intersections, and the rings around them.
-const CLEARING: [usize; 2] = [60, 2];
-
 impl ClothPart {
     /// Surface of the part at these vertices (m, shape `[vertices]`) as cloth to wear; `None` where nothing is left.
     pub fn trimmed(&self, vertices: &[P3]) -> Option<TriMesh> {
-        let mut faces = opened(&self.faces, self.nodes.len());
+        let settings = PartCutSettings::default();
+        let mut faces = opened(&self.faces, self.nodes.len(), settings.opening);
         drop_fans(&mut faces);
-        let least = (faces.len() / LEAST_SHARE).max(LEAST_FACES);
+        let least = (faces.len() / settings.least_share).max(settings.least_faces);
         drop_small_pieces(&mut faces, least);
-        let (faces, x) = compact(&faces, vertices)?;
-        let mut cloth = Cloth::new(faces, x);
-        cloth.smooth_hems();
-        cloth.clear_intersections();
+        if faces.is_empty() {
+            return None;
+        }
+        let (used, faces) = compact(&faces);
+        let mut cloth = Cloth::new(faces, used.iter().map(|v| vertices[*v as usize]).collect());
+        cloth.smooth_hems(&settings);
+        cloth.clear_intersections(&settings);
         TriMesh::new(cloth.x, cloth.faces).ok()
     }
 }
 
-/// Faces that remain after [`OPENING`] rings are taken off at the boundary and put on again.
-fn opened(faces: &[Face], vertices: usize) -> Vec<Face> {
+/// Faces that remain after so many rings are taken off at the boundary and put on again.
+fn opened(faces: &[Face], vertices: usize, rings: usize) -> Vec<Face> {
     let around = Csr::of_edges(vertices, &edges(faces));
     let boundary: BTreeSet<u32> = boundary_edges(faces).into_iter().flatten().collect();
-    let mut off: Vec<bool> = (0..vertices as u32)
-        .map(|v| boundary.contains(&v))
-        .collect();
-    (1..OPENING).for_each(|_| grow(&around, &mut off));
+    let off = (0..vertices as u32).map(|v| boundary.contains(&v));
+    let mut off: Vec<bool> = off.collect();
+    (1..rings).for_each(|_| grow(&around, &mut off));
     let mut on: Vec<bool> = off.iter().map(|off| !off).collect();
-    (0..OPENING).for_each(|_| grow(&around, &mut on));
+    (0..rings).for_each(|_| grow(&around, &mut on));
     let is_on = |f: &&Face| f.iter().all(|v| on[*v as usize]);
     faces.iter().filter(is_on).copied().collect()
 }
 
 /// Marks the neighbours of marked vertices too.
-fn grow(around: &Csr, marked: &mut [bool]) {
+pub(crate) fn grow(around: &Csr, marked: &mut [bool]) {
     let before = marked.to_vec();
     for (v, m) in marked.iter_mut().enumerate() {
         *m |= around.row(v).iter().any(|w| before[*w as usize]);
     }
-}
-
-/// Faces over the vertices that they use, and these.
-fn compact(faces: &[Face], vertices: &[P3]) -> Option<(Vec<Face>, Vec<P3>)> {
-    let used: BTreeSet<u32> = faces.iter().flatten().copied().collect();
-    let mut index = vec![u32::MAX; vertices.len()];
-    for (i, v) in used.iter().enumerate() {
-        index[*v as usize] = i as u32;
-    }
-    let faces: Vec<Face> = faces.iter().map(|f| f.map(|v| index[v as usize])).collect();
-    let x = used.iter().map(|v| vertices[*v as usize]).collect();
-    (!faces.is_empty()).then_some((faces, x))
 }
 
 /// Cloth whose vertices move.
@@ -93,25 +74,20 @@ impl Cloth {
     }
 
     /// Smooths the boundary along itself, then the cloth near it.
-    fn smooth_hems(&mut self) {
-        for _ in 0..HEM_ROUNDS {
+    fn smooth_hems(&mut self, settings: &PartCutSettings) {
+        for _ in 0..settings.hem_rounds {
             self.smooth(|cloth, v| cloth.is_hem(v), |cloth| &cloth.along);
         }
-        let [rings, rounds] = NEAR_HEM;
         let mut near: Vec<bool> = (0..self.x.len()).map(|v| self.is_hem(v)).collect();
-        (0..rings).for_each(|_| grow(&self.around, &mut near));
-        for _ in 0..rounds {
-            self.smooth(
-                |cloth, v| near[v] && !cloth.is_hem(v),
-                |cloth| &cloth.around,
-            );
+        (0..settings.near_hem).for_each(|_| grow(&self.around, &mut near));
+        for _ in 0..settings.near_hem_rounds {
+            self.smooth_inner(&near);
         }
     }
 
     /// Smooths the cloth around self-intersections until there is none.
-    fn clear_intersections(&mut self) {
-        let [rounds, rings] = CLEARING;
-        for _ in 0..rounds {
+    fn clear_intersections(&mut self, settings: &PartCutSettings) {
+        for _ in 0..settings.clearing_rounds {
             let found = intersections(&self.faces, &self.x);
             if found.is_empty() {
                 return;
@@ -122,13 +98,18 @@ impl Cloth {
                 let all = i.edge.iter().chain(&corners);
                 all.for_each(|v| near[*v as usize] = true);
             }
-            (0..rings).for_each(|_| grow(&self.around, &mut near));
-            self.smooth(
-                |cloth, v| near[v] && !cloth.is_hem(v),
-                |cloth| &cloth.around,
-            );
+            (0..settings.clearing_rings).for_each(|_| grow(&self.around, &mut near));
+            self.smooth_inner(&near);
             self.smooth(|cloth, v| near[v] && cloth.is_hem(v), |cloth| &cloth.along);
         }
+    }
+
+    /// Smooths marked vertices off the hems.
+    fn smooth_inner(&mut self, near: &[bool]) {
+        self.smooth(
+            |cloth, v| near[v] && !cloth.is_hem(v),
+            |cloth| &cloth.around,
+        );
     }
 
     /// Moves some vertices halfway to the mean of their neighbours.
@@ -162,16 +143,14 @@ mod tests {
             (0..20).contains(&i) && ((0..20).contains(&j) || ((9..11).contains(&i) && j < 28))
         };
         let at = |i: i32, j: i32| (j * 21 + i) as u32;
-        let mut faces = Vec::new();
-        for (i, j) in (0..28).flat_map(|j| (0..20).map(move |i| (i, j))) {
-            if is_in(i, j) {
-                let [a, b, c, d] = [at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)];
-                faces.extend([[a, b, c], [a, c, d]]);
-            }
-        }
-        let x: Vec<P3> = (0..21 * 29)
-            .map(|k| P3::new(0.01 * (k % 21) as f32, 0.01 * (k / 21) as f32, 0.0))
-            .collect();
+        let cells = (0..28).flat_map(|j| (0..20).map(move |i| (i, j)));
+        let cells = cells.filter(|(i, j)| is_in(*i, *j)).flat_map(|(i, j)| {
+            let [a, b, c, d] = [at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)];
+            [[a, b, c], [a, c, d]]
+        });
+        let faces = cells.collect();
+        let point = |k: i32| P3::new(0.01 * (k % 21) as f32, 0.01 * (k / 21) as f32, 0.0);
+        let x: Vec<P3> = (0..21 * 29).map(point).collect();
         let part = ClothPart {
             slot: Slot::Top,
             label: 1,

@@ -1,18 +1,8 @@
-//! ColorMixture of a garment: a Gaussian mixture over colours in the cone of hue, saturation and value (eq. 13).
+//! Appearance of a garment: a Gaussian mixture over colours in the cone of hue, saturation and value (eq. 13).
 
+use crate::settings::MixtureSettings;
 use nalgebra::{Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
-
-/// Modes of a mixture: prints, folds and shadows need a few. Not tuned.
-const MODES: usize = 4;
-/// Iterations of k-means before, and of expectation maximisation.
-const ITERATIONS: [usize; 2] = [8, 8];
-/// Least standard deviation of a mode along each axis: noise of a colour camera.
-const NOISE: f64 = 0.025;
-/// Share of colours that no mode explains: logos, highlights, wrong texture.
-const OUTLIERS: f64 = 0.02;
-/// Largest number of colours that a fit uses, evenly chosen.
-const MOST_SAMPLES: usize = 3000;
 
 /// Colour as a point of the HSV cone: chroma along the hue's direction, and value. Hue of dark and grey colours is noise,
 /// and here they lie together.
@@ -43,19 +33,19 @@ struct Mode {
 }
 
 impl Mode {
-    fn new(weight: f64, mean: Vector3<f64>, covariance: Matrix3<f64>) -> Self {
-        let floor = Matrix3::identity() * (NOISE * NOISE);
+    fn new(weight: f64, mean: Vector3<f64>, covariance: Matrix3<f64>, noise: f64) -> Self {
+        let floor = Matrix3::identity() * (noise * noise);
         let covariance = covariance + floor;
+        let precision = covariance.try_inverse();
         let determinant = covariance.determinant().max(f64::MIN_POSITIVE);
         Self {
             weight,
             mean,
-            precision: covariance
-                .try_inverse()
-                .unwrap_or_else(|| Matrix3::identity() / (NOISE * NOISE)),
+            precision: precision.unwrap_or_else(|| Matrix3::identity() / (noise * noise)),
             log_norm: -0.5 * (determinant.ln() + 3.0 * std::f64::consts::TAU.ln()),
         }
     }
+
     fn density(&self, c: &Vector3<f64>) -> f64 {
         let d = c - self.mean;
         self.weight * (self.log_norm - 0.5 * d.dot(&(self.precision * d))).exp()
@@ -70,32 +60,23 @@ pub struct ColorMixture {
 
 impl ColorMixture {
     /// Fits a mixture to colours of [`hsv_cone`]; `None` without any.
-    pub fn fit(colors: &[Vector3<f64>]) -> Option<Self> {
-        Self::fit_modes(colors, MODES)
-    }
-
-    /// The same with a given number of modes.
-    pub fn fit_modes(colors: &[Vector3<f64>], modes: usize) -> Option<Self> {
-        let stride = colors.len().div_ceil(MOST_SAMPLES).max(1);
-        let some: Vec<Vector3<f64>> = colors
-            .iter()
-            .step_by(stride)
-            .filter(|c| c.iter().all(|v| v.is_finite()))
-            .copied()
-            .collect();
+    pub fn fit(colors: &[Vector3<f64>], settings: &MixtureSettings) -> Option<Self> {
+        let stride = colors.len().div_ceil(settings.samples).max(1);
+        let some = colors.iter().step_by(stride).copied();
+        let some: Vec<_> = some.filter(|c| c.iter().all(|v| v.is_finite())).collect();
         if some.is_empty() {
             return None;
         }
-        let owners = k_means(&some, modes);
+        let owners = k_means(&some, settings.modes, settings);
         let k = owners.iter().max().map_or(1, |m| m + 1);
         let mut shares = vec![vec![0.0; k]; some.len()];
         for (s, o) in shares.iter_mut().zip(&owners) {
             s[*o] = 1.0;
         }
         let mut out = Self {
-            modes: maximise(&some, &shares),
+            modes: maximise(&some, &shares, settings.noise),
         };
-        for _ in 0..ITERATIONS[1] {
+        for _ in 0..settings.maximising {
             for (s, c) in shares.iter_mut().zip(&some) {
                 *s = out.modes.iter().map(|m| m.density(c)).collect();
                 let sum: f64 = s.iter().sum();
@@ -103,19 +84,19 @@ impl ColorMixture {
                 let scale = if sum > 1e-12 { 1.0 / sum } else { 0.0 };
                 s.iter_mut().for_each(|v| *v *= scale);
             }
-            out.modes = maximise(&some, &shares);
+            out.modes = maximise(&some, &shares, settings.noise);
         }
         Some(out)
     }
 
-    /// Negative logarithm of the density at a colour; bounded by the share of outliers.
-    pub fn cost(&self, c: &Vector3<f64>) -> f64 {
+    /// Negative logarithm of the density at a colour, bounded by the share of outliers.
+    pub fn cost(&self, c: &Vector3<f64>, outliers: f64) -> f64 {
         let density: f64 = self.modes.iter().map(|m| m.density(c)).sum();
-        -((1.0 - OUTLIERS) * density + OUTLIERS).ln()
+        -((1.0 - outliers) * density + outliers).ln()
     }
 }
 
-fn maximise(colors: &[Vector3<f64>], shares: &[Vec<f64>]) -> Vec<Mode> {
+fn maximise(colors: &[Vector3<f64>], shares: &[Vec<f64>], noise: f64) -> Vec<Mode> {
     let k = shares.first().map_or(0, Vec::len);
     let total: f64 = shares.iter().flatten().sum();
     let mode = |m: usize| {
@@ -125,16 +106,14 @@ fn maximise(colors: &[Vector3<f64>], shares: &[Vec<f64>]) -> Vec<Mode> {
         }
         let all = || colors.iter().zip(shares).map(|(c, s)| (c, s[m] / weight));
         let mean: Vector3<f64> = all().map(|(c, s)| c * s).sum();
-        let covariance = all()
-            .map(|(c, s)| (c - mean) * (c - mean).transpose() * s)
-            .sum();
-        Some(Mode::new(weight / total, mean, covariance))
+        let scatter = all().map(|(c, s)| (c - mean) * (c - mean).transpose() * s);
+        Some(Mode::new(weight / total, mean, scatter.sum(), noise))
     };
     (0..k).filter_map(mode).collect()
 }
 
 /// Clusters of colours: seeds as far apart as possible, then Lloyd's iterations. Cluster of each colour.
-pub fn k_means(colors: &[Vector3<f64>], k: usize) -> Vec<usize> {
+pub fn k_means(colors: &[Vector3<f64>], k: usize, settings: &MixtureSettings) -> Vec<usize> {
     let n = colors.len();
     if n == 0 {
         return Vec::new();
@@ -148,21 +127,19 @@ pub fn k_means(colors: &[Vector3<f64>], k: usize) -> Vec<usize> {
         for (d, c) in near.iter_mut().zip(colors) {
             *d = d.min((c - last).norm_squared());
         }
-        let far = (0..n)
-            .max_by(|a, b| near[*a].total_cmp(&near[*b]))
-            .unwrap_or(0);
-        if near[far] < NOISE * NOISE {
+        let far = (0..n).max_by(|a, b| near[*a].total_cmp(&near[*b]));
+        let far = far.unwrap_or(0);
+        if near[far] < settings.noise * settings.noise {
             break;
         }
         centres.push(colors[far]);
     }
     let mut owner = vec![0; n];
-    for _ in 0..ITERATIONS[0] {
+    for _ in 0..settings.clustering {
         for (o, c) in owner.iter_mut().zip(colors) {
             let square = |i: &usize| (centres[*i] - c).norm_squared();
-            *o = (0..centres.len())
-                .min_by(|a, b| square(a).total_cmp(&square(b)))
-                .unwrap_or(0);
+            let nearest = (0..centres.len()).min_by(|a, b| square(a).total_cmp(&square(b)));
+            *o = nearest.unwrap_or(0);
         }
         let mut sums = vec![(Vector3::zeros(), 0.0); centres.len()];
         for (o, c) in owner.iter().zip(colors) {
@@ -184,11 +161,8 @@ mod tests {
     use rand::{Rng, SeedableRng};
 
     fn around(mean: [f64; 3], n: usize, rng: &mut impl Rng) -> Vec<Vector3<f64>> {
-        (0..n)
-            .map(|_| {
-                Vector3::from(mean) + Vector3::from_fn(|_, _| 0.06 * (rng.random::<f64>() - 0.5))
-            })
-            .collect()
+        let mut noise = || Vector3::from_fn(|_, _| 0.06 * (rng.random::<f64>() - 0.5));
+        (0..n).map(|_| Vector3::from(mean) + noise()).collect()
     }
 
     #[test]
@@ -206,14 +180,17 @@ mod tests {
         let mut colors = around([0.5, 0.1, 0.8], 300, &mut rng);
         colors.extend(around([0.0, 0.0, 0.1], 100, &mut rng));
         colors.push(Vector3::repeat(f64::NAN));
-        let fit = ColorMixture::fit(&colors).expect("colours");
-        let cost = |c: [f64; 3]| fit.cost(&Vector3::from(c));
+        let settings = MixtureSettings::default();
+        let fit = |colors: &[Vector3<f64>]| ColorMixture::fit(colors, &settings);
+        let some = fit(&colors).expect("colours");
+        let cost = |c: [f64; 3]| some.cost(&Vector3::from(c), settings.outliers);
         assert!(cost([0.5, 0.1, 0.8]) < cost([0.0, 0.0, 0.1]));
         assert!(cost([0.0, 0.0, 0.1]) + 3.0 < cost([0.25, 0.05, 0.45]));
         assert!(cost([-0.5, 0.5, 0.9]).is_finite());
-        assert!(ColorMixture::fit(&[]).is_none());
-        let one = ColorMixture::fit(&[Vector3::repeat(0.3); 5]).expect("colours");
-        assert!(one.cost(&Vector3::repeat(0.3)) < one.cost(&Vector3::repeat(0.5)));
+        assert!(fit(&[]).is_none());
+        let one = fit(&[Vector3::repeat(0.3); 5]).expect("colours");
+        let cost = |v: f64| one.cost(&Vector3::repeat(v), settings.outliers);
+        assert!(cost(0.3) < cost(0.5));
     }
 
     #[test]
@@ -221,10 +198,11 @@ mod tests {
         let mut rng = rand_pcg::Pcg32::seed_from_u64(5);
         let mut colors = around([0.5, 0.1, 0.8], 50, &mut rng);
         colors.extend(around([0.0, 0.0, 0.1], 50, &mut rng));
-        let owner = k_means(&colors, 2);
+        let clusters = |all: &[_], k| k_means(all, k, &MixtureSettings::default());
+        let owner = clusters(&colors, 2);
         assert!(owner[..50].iter().all(|o| *o == owner[0]));
         assert!(owner[50..].iter().all(|o| *o != owner[0]));
-        assert!(k_means(&[Vector3::zeros(); 9], 4).iter().all(|o| *o == 0));
-        assert!(k_means(&[], 3).is_empty());
+        assert!(clusters(&[Vector3::zeros(); 9], 4).iter().all(|o| *o == 0));
+        assert!(clusters(&[], 3).is_empty());
     }
 }

@@ -2,26 +2,22 @@
 
 use super::labelling::Labelling;
 use super::prior::Slot;
+use crate::settings::IslandSettings;
 use tryon_geometry::mesh::Csr;
-
-/// Share of the nodes of a garment's largest piece up to which another one, beside another garment, is an island.
-const ISLAND: f64 = 0.3;
-/// Least share of an island's neighbours that belong to one other garment.
-const BESIDE: f64 = 0.4;
 
 impl Labelling {
     /// Gives islands of tops, bottoms and one-piece garments to the garment beside them; `around` gives the neighbours of
     /// each node.
-    pub fn join_islands(&mut self, around: &Csr) {
+    pub fn join_islands(&mut self, around: &Csr, settings: &IslandSettings) {
         let is_one =
             |l: &usize| matches!(self.slots[*l], Slot::Top | Slot::Bottom | Slot::OnePiece);
         let whole: Vec<usize> = (0..self.slots.len()).filter(is_one).collect();
         for l in whole {
             let pieces = self.pieces(l as u8, around);
             let largest = pieces.iter().map(Vec::len).max().unwrap_or(0);
-            let is_small = |p: &&Vec<u32>| p.len() as f64 <= ISLAND * largest as f64;
+            let is_small = |p: &&Vec<u32>| p.len() as f64 <= settings.most_share * largest as f64;
             for piece in pieces.iter().filter(is_small) {
-                if let Some(label) = self.label_around(piece, around) {
+                if let Some(label) = self.label_around(piece, around, settings.beside) {
                     piece.iter().for_each(|v| self.labels[*v as usize] = label);
                 }
             }
@@ -36,7 +32,7 @@ impl Labelling {
     }
 
     /// Garment that most neighbours of a piece have.
-    fn label_around(&self, piece: &[u32], around: &Csr) -> Option<u8> {
+    fn label_around(&self, piece: &[u32], around: &Csr, beside: f64) -> Option<u8> {
         let own = self.labels[*piece.first()? as usize];
         let mut counts = vec![0usize; self.slots.len()];
         for w in piece.iter().flat_map(|v| around.row(*v as usize)) {
@@ -45,7 +41,7 @@ impl Labelling {
         }
         let all: usize = counts.iter().sum();
         let most = (0..counts.len()).max_by_key(|l| counts[*l])?;
-        let is_beside = counts[most] as f64 >= BESIDE * all as f64;
+        let is_beside = counts[most] as f64 >= beside * all as f64;
         (all > 0 && is_beside && self.slots[most].is_garment()).then_some(most as u8)
     }
 }
@@ -70,7 +66,8 @@ mod tests {
             is_top_long: false,
         };
         let pairs = (1..100u32).flat_map(|v| [(v - 1, v), (v, v - 1)]);
-        labelling.join_islands(&Csr::from_pairs(100, &pairs.collect::<Vec<_>>()));
+        let around = Csr::from_pairs(100, &pairs.collect::<Vec<_>>());
+        labelling.join_islands(&around, &IslandSettings::default());
         let expected = [vec![3; 40], vec![2; 40], vec![0; 19], vec![3]].concat();
         assert_eq!(labelling.labels, expected, "what lies in skin stays");
     }

@@ -2,38 +2,17 @@
 
 use super::color_mixture::ColorMixture;
 use super::node_colors::NodeColors;
-use super::prior::{BodyRegion, LONG_TOP, Slot};
+use super::prior::{BodyRegion, Slot};
 use crate::CaptureError;
 use crate::scalp::scalp;
+use crate::settings::LabelSettings;
 use crate::topology::ClothTemplate;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 use tryon_body::Template;
 use tryon_geometry::mrf::{ExpansionConfig, MrfModel};
 
-/// Cost of a label change between neighbours of equal colour, nats (ψ of eq. 14).
-const SMOOTHNESS: f32 = 2.0;
-/// Share of it left between neighbours of different colour, and the difference that halves the rest.
-const CONTRAST: [f32; 2] = [0.1, 0.10];
-/// Cost of another label than in the first frame, nats: garments slide over the body by little.
-const CHANGE: f32 = 1.0;
-/// Step down from the upper to the lower node that halves it, metres: hems lie on what is below.
-const STEP: f32 = 0.003;
-/// Mean cost above that of their own appearance from which colours are no skin, nats: bare arms have up to 2.0, shirts in an
-/// open jacket from 7.7.
-pub(super) const LEAST_UNLIKE_SKIN: f64 = 4.0;
-/// Least share of a garment's first nodes that it covers.
-const LEAST_CLOTH: f64 = 0.2;
-/// Turns of appearances and labels.
-const TURNS: usize = 5;
-/// Modes of skin, hair and what hands hold.
-const SKIN_MODES: usize = 6;
-/// Mean cost above that of its own appearance from which a region is no skin, nats.
-pub(super) const DISTINCT: f64 = 0.8;
-/// Cost of a garment at a node of the tube between the legs that no scan point is near, nats: below a hem there is nothing.
-const EMPTY: f32 = 2.0;
-
-/// Setting of a segmentation.
+/// Configuration of a segmentation.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct LabelConfig {
     /// Garments; `None` finds them.
@@ -42,6 +21,8 @@ pub struct LabelConfig {
     pub without_prior: bool,
     /// Leave out the smoothness (ablation).
     pub without_smoothness: bool,
+    /// Settings.
+    pub settings: LabelSettings,
 }
 
 /// Labels of a template's nodes.
@@ -51,7 +32,7 @@ pub struct Labelling {
     pub slots: Vec<Slot>,
     /// Label of each node, shape `[nodes]`.
     pub labels: Vec<u8>,
-    /// ColorMixture of each label; `None` without a coloured point.
+    /// Appearance of each label; `None` without a coloured point.
     pub appearances: Vec<Option<ColorMixture>>,
     /// Energy per node, nats.
     pub energy: f64,
@@ -77,13 +58,11 @@ impl Labelling {
     /// Part of each label in the output: 0 for skin and hair, then one a garment.
     pub fn parts(&self) -> Vec<u8> {
         let mut next = 0;
-        self.slots
-            .iter()
-            .map(|s| {
-                next += u8::from(s.is_garment());
-                if s.is_garment() { next } else { 0 }
-            })
-            .collect()
+        let part = |s: &Slot| {
+            next += u8::from(s.is_garment());
+            if s.is_garment() { next } else { 0 }
+        };
+        self.slots.iter().map(part).collect()
     }
 }
 
@@ -103,23 +82,21 @@ pub fn relabel_nodes(
     let count = before.slots.len();
     for (v, own) in before.labels.iter().enumerate() {
         for l in (0..count).filter(|l| *l != usize::from(*own)) {
-            unary[v * count + l] += CHANGE;
+            unary[v * count + l] += config.settings.change;
         }
     }
     let (labels, energy) = labeller.expand(&unary, &before.labels)?;
     Ok(Labelling {
-        slots: before.slots.clone(),
-        appearances: before.appearances.clone(),
         labels,
         energy,
-        is_top_long: before.is_top_long,
+        ..before.clone()
     })
 }
 
 /// Costs and smoothness of one frame's labels.
 pub(super) struct Labeller<'a> {
     pub(super) nodes: &'a NodeColors,
-    config: &'a LabelConfig,
+    pub(super) config: &'a LabelConfig,
     pub(super) regions: Vec<BodyRegion>,
     /// Scalp: back and top of the head.
     hair: Vec<bool>,
@@ -143,22 +120,24 @@ impl<'a> Labeller<'a> {
     ) -> Self {
         let template = cloth.template();
         let edges: Vec<[u32; 2]> = template.topology().edges().iter().map(|e| e.v).collect();
-        let smoothness = if config.without_smoothness {
-            0.0
-        } else {
-            SMOOTHNESS
+        let settings = &config.settings;
+        let smoothness = match config.without_smoothness {
+            true => 0.0,
+            false => settings.smoothness,
         };
         let weight = |e: &[u32; 2]| {
             let [a, b] = e.map(|v| nodes.means[v as usize]);
-            let [floor, half] = CONTRAST;
+            let (floor, half) = (settings.least_smoothness, settings.contrast);
             let contrast = match (a, b) {
                 (Some(a), Some(b)) => ((a - b).norm() as f32 / half).powi(2),
                 _ => 0.0,
             };
-            let contrast = contrast + (step_down(template, nodes, *e).max(0.0) / STEP).powi(2);
+            let down = step_down(template, nodes, *e).max(0.0);
+            let contrast = contrast + (down / settings.step).powi(2);
             smoothness * (floor + (1.0 - floor) / (1.0 + contrast))
         };
         let regions = BodyRegion::of_vertices(template);
+        let is_empty = |v| cloth.is_between(v) && nodes.points.row(v).is_empty();
         Self {
             nodes,
             config,
@@ -166,9 +145,7 @@ impl<'a> Labeller<'a> {
             bottom: vec![false; regions.len()],
             second_top: vec![None; regions.len()],
             is_top_long: false,
-            empty: (0..regions.len())
-                .map(|v| cloth.is_between(v) && nodes.points.row(v).is_empty())
-                .collect(),
+            empty: (0..regions.len()).map(is_empty).collect(),
             regions,
             weights: edges.iter().map(weight).collect(),
             edges,
@@ -183,7 +160,7 @@ impl<'a> Labeller<'a> {
     pub(super) fn run(&self, slots: Vec<Slot>) -> Result<Labelling, CaptureError> {
         let mut labels = self.first_labels(&slots);
         let mut out = None;
-        for _ in 0..TURNS {
+        for _ in 0..self.config.settings.turns {
             let appearances = self.appearances(&slots, &labels);
             let unary = self.unary(&slots, &appearances);
             let (next, energy) = self.expand(&unary, &labels)?;
@@ -213,10 +190,7 @@ impl<'a> Labeller<'a> {
         let mut next: Vec<u32> = start.iter().map(|l| u32::from(*l)).collect();
         let report = model
             .expand(unary, &mut next, &ExpansionConfig::default())
-            .map_err(|e| CaptureError::Solve {
-                stage: "segmentation",
-                why: e.to_string(),
-            })?;
+            .map_err(|e| CaptureError::solve("segmentation", e))?;
         let labels = next.iter().map(|l| *l as u8).collect();
         Ok((labels, report.energy / self.count().max(1) as f64))
     }
@@ -241,17 +215,16 @@ impl<'a> Labeller<'a> {
             Some(_) => 0,
             None => label,
         };
-        let mut labels: Vec<u8> = (0..self.count())
-            .map(|v| match self.regions[v] {
-                BodyRegion::Head if self.hair[v] => index(Slot::Hair).unwrap_or(0),
-                BodyRegion::Head | BodyRegion::Neck | BodyRegion::Hand => 0,
-                BodyRegion::Chest | BodyRegion::Abdomen => torso,
-                BodyRegion::Pelvis | BodyRegion::Thigh => legs,
-                BodyRegion::UpperArm | BodyRegion::Forearm => nearer(v, chest, torso),
-                BodyRegion::Shin => nearer(v, thighs, legs),
-                BodyRegion::Foot => index(Slot::Shoes).unwrap_or(0),
-            })
-            .collect();
+        let first = |v: usize| match self.regions[v] {
+            BodyRegion::Head if self.hair[v] => any(&[Slot::Hair]),
+            BodyRegion::Head | BodyRegion::Neck | BodyRegion::Hand => 0,
+            BodyRegion::Chest | BodyRegion::Abdomen => torso,
+            BodyRegion::Pelvis | BodyRegion::Thigh => legs,
+            BodyRegion::UpperArm | BodyRegion::Forearm => nearer(v, chest, torso),
+            BodyRegion::Shin => nearer(v, thighs, legs),
+            BodyRegion::Foot => any(&[Slot::Shoes]),
+        };
+        let mut labels: Vec<u8> = (0..self.count()).map(first).collect();
         if let (Some(under), Some(top)) = (index(Slot::Under), index(Slot::Top)) {
             for (label, second) in labels.iter_mut().zip(&self.second_top) {
                 *label = second.map_or(*label, |s| if s { under } else { top });
@@ -270,21 +243,21 @@ impl<'a> Labeller<'a> {
     }
 
     pub(super) fn skin_appearance(&self) -> Option<ColorMixture> {
-        let colors = self.nodes.of(self.bare_nodes().into_iter());
-        ColorMixture::fit_modes(&colors, SKIN_MODES)
+        self.nodes.skin_appearance(self.bare_nodes().into_iter())
     }
 
     fn appearances(&self, slots: &[Slot], labels: &[u8]) -> Vec<Option<ColorMixture>> {
         let own = |l: usize| (0..self.count()).filter(move |v| usize::from(labels[*v]) == l);
-        let mut out: Vec<Option<ColorMixture>> = (0..slots.len())
-            .map(|l| {
-                // Sleeves taken for skin would make skin look like sleeves.
-                if slots[l] == Slot::Skin {
-                    return self.skin_appearance();
-                }
-                self.appearance(own(l).collect(), slots[l])
-            })
-            .collect();
+        let look = |l: usize| match slots[l] {
+            // Sleeves taken for skin would make skin look like sleeves.
+            Slot::Skin => self.skin_appearance(),
+            Slot::Hair => self.nodes.appearance(own(l)),
+            _ => {
+                let cloth = self.without_skin(own(l).collect());
+                self.nodes.appearance(cloth.into_iter())
+            }
+        };
+        let mut out: Vec<Option<ColorMixture>> = (0..slots.len()).map(look).collect();
         // Garments of one colour share an appearance: else each keeps the shades of the nodes that it began with.
         let garments = (0..slots.len()).filter(|l| slots[*l].is_garment());
         let garments: Vec<usize> = garments.collect();
@@ -293,9 +266,9 @@ impl<'a> Labeller<'a> {
                 let (Some(one), Some(other)) = (&out[a], &out[b]) else {
                     continue;
                 };
-                let excess = self.excess(own(a), (one, other)) + self.excess(own(b), (other, one));
-                if excess < 2.0 * DISTINCT {
-                    let both = ColorMixture::fit(&self.nodes.of(own(a).chain(own(b))));
+                let excess = self.excess(own(a), one, other) + self.excess(own(b), other, one);
+                if excess < 2.0 * self.config.settings.distinct {
+                    let both = self.nodes.appearance(own(a).chain(own(b)));
                     (out[a], out[b]) = (both.clone(), both);
                 }
             }
@@ -303,29 +276,20 @@ impl<'a> Labeller<'a> {
         out
     }
 
-    /// Appearance of a label's nodes; that of a garment leaves out bare skin among them.
-    fn appearance(&self, own: Vec<usize>, slot: Slot) -> Option<ColorMixture> {
-        let own = if slot.is_garment() {
-            self.without_skin(own)
-        } else {
-            own
-        };
-        ColorMixture::fit(&self.nodes.of(own.into_iter()))
-    }
-
     /// Nodes of a garment's start without those that look like skin, if the rest clearly does not: regions start whole, and
     /// shorts would keep the colour of the thighs below them.
     pub(super) fn without_skin(&self, own: Vec<usize>) -> Vec<usize> {
-        let all = ColorMixture::fit(&self.nodes.of(own.iter().copied()));
+        let settings = &self.config.settings;
+        let all = self.nodes.appearance(own.iter().copied());
         let Some((all, skin)) = all.zip(self.skin_appearance()) else {
             return own;
         };
-        let is_cloth =
-            |v: &usize| self.nodes.cost(*v, &skin) - self.nodes.cost(*v, &all) > DISTINCT;
+        let excess = |v: &usize| self.nodes.cost(*v, &skin) - self.nodes.cost(*v, &all);
+        let is_cloth = |v: &usize| excess(v) > settings.distinct;
         let cloth: Vec<usize> = own.iter().copied().filter(is_cloth).collect();
-        let is_enough = cloth.len() as f64 >= LEAST_CLOTH * own.len() as f64;
-        let excess = self.excess(cloth.iter().copied(), (&all, &skin));
-        if is_enough && excess >= LEAST_UNLIKE_SKIN {
+        let is_enough = cloth.len() as f64 >= settings.least_cloth * own.len() as f64;
+        let excess = self.excess(cloth.iter().copied(), &all, &skin);
+        if is_enough && excess >= settings.unlike_skin {
             cloth
         } else {
             own
@@ -336,14 +300,13 @@ impl<'a> Labeller<'a> {
     pub(super) fn excess(
         &self,
         nodes: impl Iterator<Item = usize>,
-        (own, other): (&ColorMixture, &ColorMixture),
+        own: &ColorMixture,
+        other: &ColorMixture,
     ) -> f64 {
         let seen = nodes.filter(|v| !self.nodes.points.row(*v).is_empty());
-        let (sum, n) = seen.fold((0.0, 0usize), |(s, n), v| {
-            (
-                s + self.nodes.cost(v, other) - self.nodes.cost(v, own),
-                n + 1,
-            )
+        let cost = |v, look| self.nodes.cost(v, look);
+        let (sum, n) = seen.fold((0.0, 0usize), |(sum, n), v| {
+            (sum + cost(v, other) - cost(v, own), n + 1)
         });
         sum / n.max(1) as f64
     }
@@ -352,7 +315,7 @@ impl<'a> Labeller<'a> {
         let is_long = self.is_top_long && region == BodyRegion::Thigh;
         match slot {
             _ if self.config.without_prior => 0.0,
-            Slot::Top | Slot::Under if is_long => LONG_TOP[1],
+            Slot::Top | Slot::Under if is_long => self.config.settings.long_top,
             _ => slot.cost(region),
         }
     }
@@ -364,8 +327,9 @@ impl<'a> Labeller<'a> {
             for (slot, appearance) in slots.iter().zip(appearances) {
                 let color = appearance.as_ref().map_or(0.0, |a| self.nodes.cost(v, a));
                 let prior = self.prior(*slot, self.regions[v]);
-                let empty = if self.empty[v] && slot.is_garment() {
-                    EMPTY
+                let is_empty = self.empty[v] && slot.is_garment();
+                let empty = if is_empty {
+                    self.config.settings.empty
                 } else {
                     0.0
                 };

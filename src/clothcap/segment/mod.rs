@@ -15,6 +15,6 @@ pub use labelling::{LabelConfig, Labelling, relabel_nodes};
 pub use node_colors::NodeColors;
 pub use outfit::label_nodes;
 pub use prior::{BodyRegion, IMPOSSIBLE, Slot};
-pub use scan_labels::label_scan;
+pub use scan_labels::ScanLabeller;
 pub(super) use unseen::bone_slices;
 pub use unseen::{seen_slices, unseen_regions};

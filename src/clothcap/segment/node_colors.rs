@@ -5,6 +5,7 @@ use super::color_mixture::{ColorMixture, hsv_cone};
 use super::prior::BodyRegion;
 use crate::align::Alignment;
 use crate::scan::BodyScan;
+use crate::settings::{LabelSettings, MixtureSettings};
 use nalgebra::Vector3;
 use tryon_body::Template;
 #[cfg(test)]
@@ -12,12 +13,7 @@ use tryon_geometry::math::P3;
 use tryon_geometry::math::V3;
 use tryon_geometry::mesh::Csr;
 
-/// Distance up to which a scan point belongs to the surface below it, metres.
-const NEAR: f32 = 0.03;
-/// Points of a node that count as independent: neighbours in a scan share their light and their weave.
-const INDEPENDENT: f64 = 2.0;
-
-/// BodyScan points and their colours at each node of the template.
+/// Scan points and their colours at each node of the template.
 #[derive(Clone, Debug)]
 pub struct NodeColors {
     /// Points of each node.
@@ -31,17 +27,24 @@ pub struct NodeColors {
     /// The same above the mean of its neighbours, metres: opposite signs
     /// on both sides of a hem, none where cloth flares.
     pub steps: Vec<f32>,
+    /// Settings of the segmentation.
+    pub settings: LabelSettings,
 }
 
 impl NodeColors {
     /// Gathers the points of a scan at the nearest corners of their faces.
-    pub fn new(scan: &BodyScan, alignment: &Alignment, template: &Template) -> Self {
+    pub fn new(
+        scan: &BodyScan,
+        alignment: &Alignment,
+        template: &Template,
+        settings: &LabelSettings,
+    ) -> Self {
         let (matches, faces) = (&alignment.matches, template.mesh().faces());
         let nodes = alignment.surface.len();
         let mut pairs = Vec::new();
         for (i, m) in matches.iter().enumerate() {
-            if m.weight > 0.0 && m.distance < NEAR {
-                pairs.push((faces[m.face as usize][m.nearest_corner()], i as u32));
+            if m.weight > 0.0 && m.distance < settings.near {
+                pairs.push((m.nearest_vertex(faces), i as u32));
             }
         }
         let points = Csr::from_pairs(nodes, &pairs);
@@ -56,22 +59,37 @@ impl NodeColors {
         } else {
             (0..nodes).map(mean).collect()
         };
-        let heights = heights(alignment, template, (scan, &points));
+        let heights = heights(alignment, template, scan, &points);
         Self {
             steps: steps(&heights, template.topology().vertex_neighbours()),
             heights,
             points,
             colors,
             means,
+            settings: *settings,
         }
     }
 
-    /// Colours of the points of some nodes.
-    pub fn of(&self, nodes: impl Iterator<Item = usize>) -> Vec<Vector3<f64>> {
+    /// Appearance of the points of some nodes; `None` without any.
+    pub fn appearance(&self, nodes: impl Iterator<Item = usize>) -> Option<ColorMixture> {
+        self.fitted(nodes, &self.settings.colors)
+    }
+
+    /// The same with the modes of skin.
+    pub fn skin_appearance(&self, nodes: impl Iterator<Item = usize>) -> Option<ColorMixture> {
+        let settings = self.settings.colors;
+        let modes = settings.skin_modes;
+        self.fitted(nodes, &MixtureSettings { modes, ..settings })
+    }
+
+    fn fitted(
+        &self,
+        nodes: impl Iterator<Item = usize>,
+        settings: &MixtureSettings,
+    ) -> Option<ColorMixture> {
         let points = nodes.flat_map(|v| self.points.row(v));
-        points
-            .filter_map(|p| self.colors.get(*p as usize).copied())
-            .collect()
+        let colors = points.filter_map(|p| self.colors.get(*p as usize).copied());
+        ColorMixture::fit(&colors.collect::<Vec<_>>(), settings)
     }
 
     /// Cost of an appearance at a node, nats; 0 without points, for all appearances alike.
@@ -80,11 +98,10 @@ impl NodeColors {
         if row.is_empty() || self.colors.is_empty() {
             return 0.0;
         }
-        let sum: f64 = row
-            .iter()
-            .map(|p| appearance.cost(&self.colors[*p as usize]))
-            .sum();
-        sum / row.len() as f64 * (row.len() as f64).min(INDEPENDENT)
+        let outliers = self.settings.colors.outliers;
+        let cost = |p: &u32| appearance.cost(&self.colors[*p as usize], outliers);
+        let sum: f64 = row.iter().map(cost).sum();
+        sum / row.len() as f64 * (row.len() as f64).min(self.settings.independent)
     }
 }
 
@@ -98,15 +115,13 @@ impl NodeColors {
     ) -> Self {
         let (mesh, regions) = (template.mesh(), BodyRegion::of_vertices(template));
         let normals = template.normals(mesh.vertices());
-        let places = mesh.vertices().iter().zip(&regions).zip(&normals);
-        let colors: Vec<_> = places
-            .enumerate()
-            .map(|(v, ((p, region), n))| {
-                let light = 0.6 + 0.25 * n.y.max(0.0) + 0.15 * n.z.max(0.0);
-                let grain = 1.0 + 0.02 * ((v * 7919) % 13) as f32 / 13.0;
-                hsv_cone(color(p, *region).map(|c| (c * light * grain) as u8))
-            })
-            .collect();
+        let painted = |(v, p): (usize, &P3)| {
+            let n = normals[v];
+            let light = 0.6 + 0.25 * n.y.max(0.0) + 0.15 * n.z.max(0.0);
+            let grain = 1.0 + 0.02 * ((v * 7919) % 13) as f32 / 13.0;
+            hsv_cone(color(p, regions[v]).map(|c| (c * light * grain) as u8))
+        };
+        let colors: Vec<_> = mesh.vertices().iter().enumerate().map(painted).collect();
         let pairs: Vec<_> = (0..regions.len() as u32).map(|v| (v, v)).collect();
         let heights: Vec<f32> = mesh.vertices().iter().map(height).collect();
         Self {
@@ -115,6 +130,7 @@ impl NodeColors {
             colors,
             steps: steps(&heights, template.topology().vertex_neighbours()),
             heights,
+            settings: LabelSettings::default(),
         }
     }
 }
@@ -135,11 +151,7 @@ fn mean(values: impl Iterator<Item = f32>) -> Option<f32> {
 
 /// Height of the scan over the surface that the free one is coupled to, along its normals, metres: of the free surface,
 /// with the mean of what it leaves of the node's points.
-fn heights(
-    alignment: &Alignment,
-    template: &Template,
-    (scan, points): (&BodyScan, &Csr),
-) -> Vec<f32> {
+fn heights(alignment: &Alignment, template: &Template, scan: &BodyScan, points: &Csr) -> Vec<f32> {
     let faces = template.mesh().faces();
     let normals = template.normals(&alignment.model);
     let height = |v: usize| {

@@ -1,23 +1,12 @@
 //! Number and kinds of the garments of an outfit, found by the labels that each choice leads to.
 
-use super::color_mixture::ColorMixture;
-use super::labelling::{DISTINCT, LabelConfig, Labeller, Labelling};
+use super::labelling::{LabelConfig, Labeller, Labelling};
 use super::node_colors::NodeColors;
 use super::prior::{BodyRegion, Slot};
 use crate::CaptureError;
 use crate::topology::{ClothTemplate, LegTopology};
 use nalgebra::Vector3;
 use tryon_geometry::math::order_statistics::medians;
-
-/// Least difference between the dyes of shoes and skin, light left out: bare feet have up to 0.11, shoes from 0.37.
-const LEAST_DYE: f64 = 0.2;
-/// Least share of the feet that shoes cover: hems of trousers lie there, too.
-const LEAST_FEET: f64 = 0.3;
-/// Mean step at a hem from which one garment lies over the other, metres. A dress has 0.0009 along its deepest folds, tops over
-/// bottoms have 0.0012 to 0.008.
-const LEAST_OVERLAP: f64 = 0.0012;
-/// Largest step that counts, metres.
-const MOST_OVERLAP: f64 = 0.01;
 
 /// Labels the nodes of a template.
 ///
@@ -34,23 +23,15 @@ pub fn label_nodes(
         slots.extend(garments.iter().filter(|s| s.is_garment()));
         return labeller.run(slots);
     }
-    let all = labeller.run(vec![
-        Slot::Skin,
-        Slot::Hair,
-        Slot::Top,
-        Slot::Bottom,
-        Slot::Shoes,
-    ])?;
+    use Slot::{Bottom, Hair, Shoes, Skin, Top};
+    let all = labeller.run(vec![Skin, Hair, Top, Bottom, Shoes])?;
     let mut slots = labeller.worn(&all);
     labeller.leave_out_bottom(&all);
     if slots.contains(&Slot::Top) && labeller.find_second_top() {
         slots.push(Slot::Under);
     }
-    let out = if slots == all.slots {
-        all
-    } else {
-        labeller.run(slots)?
-    };
+    let is_same = slots == all.slots;
+    let out = if is_same { all } else { labeller.run(slots)? };
     if labeller.is_alike(&out) {
         return labeller.draw_hem(out, cloth.legs());
     }
@@ -64,11 +45,12 @@ impl Labeller<'_> {
         let low = self.run(high.slots.clone())?;
         let [up, down] = [&high, &low].map(|found| self.overlap(found));
         // A long hem lies over what is below it.
-        let is_low = down > up && down >= LEAST_OVERLAP;
+        let least = self.config.settings.outfit.overlap;
+        let is_low = down > up && down >= least;
         let best = if is_low { low } else { high };
         self.is_top_long = best.is_top_long;
         // Overalls are rarer than trousers and a top of one colour, skirts and tops of one colour rarer than dresses.
-        if legs == LegTopology::Joined && up.max(down) < LEAST_OVERLAP {
+        if legs == LegTopology::Joined && up.max(down) < least {
             let slots = best.slots.iter().filter(|s| **s != Slot::Bottom);
             let whole = |s: &Slot| if *s == Slot::Top { Slot::OnePiece } else { *s };
             return self.run(slots.map(whole).collect());
@@ -86,42 +68,36 @@ impl Labeller<'_> {
     fn worn(&self, all: &Labelling) -> Vec<Slot> {
         let skin = self.skin_appearance();
         let is_worn = |l: usize| {
-            let own: Vec<usize> = (0..self.count())
-                .filter(|v| usize::from(all.labels[*v]) == l)
-                .filter(|v| !self.nodes.points.row(*v).is_empty())
-                .collect();
+            let own = (0..self.count()).filter(|v| usize::from(all.labels[*v]) == l);
+            let own = own.filter(|v| !self.nodes.points.row(*v).is_empty());
+            let own: Vec<usize> = own.collect();
             let (Some(skin), Some(look)) = (&skin, &all.appearances[l]) else {
                 return !own.is_empty();
             };
             if all.slots[l] == Slot::Shoes && !self.are_shoes(&own) {
                 return false;
             }
-            self.excess(own.into_iter(), (look, skin)) > DISTINCT
+            self.excess(own.into_iter(), look, skin) > self.config.settings.distinct
         };
-        (0..all.slots.len())
-            .filter(|l| !all.slots[*l].is_garment() || is_worn(*l))
-            .map(|l| all.slots[l])
-            .collect()
+        let worn = (0..all.slots.len()).filter(|l| !all.slots[*l].is_garment() || is_worn(*l));
+        worn.map(|l| all.slots[l]).collect()
     }
 
     /// Nodes cover the feet, and are dyed. Costs of colours do not tell: feet lie in another light than faces and hands.
     fn are_shoes(&self, own: &[usize]) -> bool {
+        let settings = &self.config.settings.outfit;
         let seen = |v: &usize| self.nodes.means[*v].is_some();
         let feet = (0..self.count()).filter(|v| self.regions[*v] == BodyRegion::Foot);
         let feet = feet.filter(seen).count();
         let covered = own.iter().filter(|v| self.regions[**v] == BodyRegion::Foot);
         let dyes = self.dye(own).zip(self.dye(&self.bare_nodes()));
-        covered.count() as f64 >= LEAST_FEET * feet as f64
-            && dyes.is_none_or(|(shoes, skin)| (shoes - skin).norm() > LEAST_DYE)
+        covered.count() as f64 >= settings.feet * feet as f64
+            && dyes.is_none_or(|(shoes, skin)| (shoes - skin).norm() > settings.dye)
     }
 
     /// Median colour of nodes without light.
     fn dye(&self, nodes: &[usize]) -> Option<Vector3<f64>> {
-        let colors: Vec<_> = nodes
-            .iter()
-            .filter_map(|v| self.without_light(*v))
-            .collect();
-        medians(&colors).map(Vector3::from)
+        medians(&self.colors(nodes)).map(Vector3::from)
     }
 
     /// Top and bottom of a labelling look alike.
@@ -135,13 +111,13 @@ impl Labeller<'_> {
             self.without_skin(all.collect())
         };
         let [upper, lower]: [Vec<usize>; 2] = [top, bottom].map(own);
-        let look = |nodes: &[usize]| ColorMixture::fit(&self.nodes.of(nodes.iter().copied()));
+        let look = |nodes: &[usize]| self.nodes.appearance(nodes.iter().copied());
         let (Some(a), Some(b)) = (look(&upper), look(&lower)) else {
             return true;
         };
-        let excess =
-            self.excess(upper.into_iter(), (&a, &b)) + self.excess(lower.into_iter(), (&b, &a));
-        excess < 2.0 * DISTINCT
+        let upper = self.excess(upper.into_iter(), &a, &b);
+        let lower = self.excess(lower.into_iter(), &b, &a);
+        upper + lower < 2.0 * self.config.settings.distinct
     }
 
     /// Mean step down from top to bottom where they meet, metres.
@@ -149,6 +125,7 @@ impl Labeller<'_> {
         let Some(ends) = ends(found) else {
             return 0.0;
         };
+        let most = self.config.settings.outfit.most_overlap;
         let steps = self.edges.iter().filter_map(|e| {
             let labels = e.map(|v| usize::from(found.labels[v as usize]));
             let [p, q] = e.map(|v| self.nodes.steps[v as usize]);
@@ -157,7 +134,7 @@ impl Labeller<'_> {
                 [b, a] if [a, b] == ends => q - p,
                 _ => return None,
             };
-            Some(f64::from(step).clamp(-MOST_OVERLAP, MOST_OVERLAP))
+            Some(f64::from(step).clamp(-most, most))
         });
         let (sum, n) = steps.fold((0.0, 0), |(s, n), x| (s + x, n + 1));
         sum / f64::from(n.max(1))
@@ -176,11 +153,22 @@ mod tests {
     use tryon_body::embedded;
     use tryon_geometry::math::P3;
 
+    /// Labels of a template of a topology with one point a node, painted by place and region, at heights over the body (m).
+    fn found(
+        legs: LegTopology,
+        color: impl Fn(&P3, BodyRegion) -> [f32; 3],
+        height: impl Fn(&P3) -> f32,
+    ) -> Labelling {
+        let cloth = ClothTemplate::new(&embedded::template(), legs).expect("small");
+        let nodes = NodeColors::painted(cloth.template(), color, height);
+        label_nodes(&cloth, &nodes, &LabelConfig::default()).expect("finite")
+    }
+
     /// Labels of a top and bottom of one colour, the top `thick` metres over the bottom, and nodes of the top below the pelvis.
     fn label(thick: f32) -> (Labelling, usize) {
-        let cloth = ClothTemplate::new(&embedded::template(), LegTopology::Apart).expect("small");
-        let regions = BodyRegion::of_vertices(cloth.template());
-        let vertices = cloth.template().mesh().vertices();
+        let template = embedded::template();
+        let regions = BodyRegion::of_vertices(&template);
+        let vertices = template.mesh().vertices();
         let thighs = vertices.iter().zip(&regions);
         let thighs = thighs.filter(|(_, r)| **r == BodyRegion::Thigh);
         let hem = thighs.map(|(p, _)| p.y).fold(f32::MIN, f32::max) - 0.08;
@@ -189,13 +177,10 @@ mod tests {
             _ => [44.0, 52.0, 86.0],
         };
         let height = |p: &P3| if p.y > hem { thick } else { 0.0 };
-        let nodes = NodeColors::painted(cloth.template(), color, height);
-        let found = label_nodes(&cloth, &nodes, &LabelConfig::default()).expect("finite");
+        let found = found(LegTopology::Apart, color, height);
         let [top, _] = ends(&found).expect("top and bottom");
-        let low = regions
-            .iter()
-            .zip(&found.labels)
-            .filter(|(r, l)| **r == BodyRegion::Thigh && usize::from(**l) == top);
+        let low = regions.iter().zip(&found.labels);
+        let low = low.filter(|(r, l)| **r == BodyRegion::Thigh && usize::from(**l) == top);
         let low = low.count();
         (found, low)
     }
@@ -210,8 +195,8 @@ mod tests {
 
     #[test]
     fn a_bare_belly_and_bare_thighs_are_skin() {
-        let cloth = ClothTemplate::new(&embedded::template(), LegTopology::Apart).expect("small");
-        let regions = BodyRegion::of_vertices(cloth.template());
+        let template = embedded::template();
+        let regions = BodyRegion::of_vertices(&template);
         let is_bare = |p: &P3, r: BodyRegion| match r {
             BodyRegion::Chest => p.y < 1.25,
             BodyRegion::Abdomen => true,
@@ -224,19 +209,16 @@ mod tests {
             false if p.y > 1.1 => [40.0, 110.0, 60.0],
             false => [44.0, 52.0, 86.0],
         };
-        let nodes = NodeColors::painted(cloth.template(), color, |_| 0.0);
-        let found = label_nodes(&cloth, &nodes, &LabelConfig::default()).expect("finite");
-        let vertices = cloth.template().mesh().vertices();
-        let wrong = vertices.iter().zip(&regions).zip(&found.labels);
-        let wrong = wrong
-            .filter(|((p, r), l)| is_bare(p, **r) == found.slots[usize::from(**l)].is_garment());
-        let wrong = wrong.count();
+        let found = found(LegTopology::Apart, color, |_| 0.0);
+        let is_garment = |l: &u8| found.slots[usize::from(*l)].is_garment();
+        let is_wrong = |((p, r), l): &((&P3, &BodyRegion), &u8)| is_bare(p, **r) == is_garment(l);
+        let all = template.mesh().vertices().iter().zip(&regions);
+        let wrong = all.zip(&found.labels).filter(is_wrong).count();
         assert!(wrong * 100 < regions.len(), "{wrong} nodes");
     }
 
     #[test]
     fn a_dress_over_bare_thighs_is_one_piece() {
-        let cloth = ClothTemplate::new(&embedded::template(), LegTopology::Joined).expect("small");
         let is_dress = |p: &P3, r: BodyRegion| {
             use BodyRegion::*;
             matches!(r, Chest | Abdomen | Pelvis) || r == Thigh && p.y > 0.65
@@ -245,25 +227,20 @@ mod tests {
             true => [120.0, 66.0, 92.0],
             false => [96.0, 62.0, 44.0],
         };
-        let nodes = NodeColors::painted(cloth.template(), color, |_| 0.0);
-        let found = label_nodes(&cloth, &nodes, &LabelConfig::default()).expect("finite");
-        let expected = [Slot::Skin, Slot::Hair, Slot::OnePiece];
-        assert_eq!(found.slots, expected);
+        let found = found(LegTopology::Joined, color, |_| 0.0);
+        assert_eq!(found.slots, [Slot::Skin, Slot::Hair, Slot::OnePiece]);
     }
 
     #[test]
     fn feet_in_another_light_are_bare_and_leather_is_worn() {
         let finds_shoes = |feet: [f32; 3]| {
-            let cloth =
-                ClothTemplate::new(&embedded::template(), LegTopology::Apart).expect("small");
             let color = |_: &P3, r: BodyRegion| match r {
                 BodyRegion::Foot => feet,
                 BodyRegion::Thigh | BodyRegion::Shin | BodyRegion::Pelvis => [44.0, 52.0, 86.0],
                 BodyRegion::Chest | BodyRegion::Abdomen => [40.0, 110.0, 60.0],
                 _ => [205.0, 150.0, 120.0],
             };
-            let nodes = NodeColors::painted(cloth.template(), color, |_| 0.0);
-            let found = label_nodes(&cloth, &nodes, &LabelConfig::default()).expect("finite");
+            let found = found(LegTopology::Apart, color, |_| 0.0);
             found.slots.contains(&Slot::Shoes)
         };
         assert!(!finds_shoes([205.0, 150.0, 120.0]));

@@ -7,9 +7,6 @@ use tryon_body::parts::BodySegment;
 /// Cost of an impossible label, nats: no colour outweighs it.
 pub const IMPOSSIBLE: f32 = 60.0;
 
-/// Cost of a top at a thigh, nats, and that of one which is known to reach there.
-pub(super) const LONG_TOP: [f32; 2] = [3.0, 0.3];
-
 /// Place of a label on the body.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
@@ -137,8 +134,7 @@ impl Slot {
     pub fn cost(self, region: BodyRegion) -> f32 {
         use BodyRegion::*;
         match (self, region) {
-            (Self::Skin, Head | Hand) => 0.0,
-            (Self::Skin, Neck) => 0.0,
+            (Self::Skin, Head | Hand | Neck) => 0.0,
             (Self::Skin, Forearm) => 0.3,
             (Self::Skin, UpperArm | Shin | Foot) => 0.6,
             (Self::Skin, Thigh) => 1.0,
@@ -150,12 +146,11 @@ impl Slot {
             (Self::Hair, UpperArm | Abdomen) => 4.0,
             (Self::Hair, _) => IMPOSSIBLE,
 
-            (Self::Top | Self::Under, Chest | Abdomen) => 0.0,
+            (Self::Top | Self::Under, Chest | Abdomen | Pelvis) => 0.0,
             (Self::Top | Self::Under, UpperArm) => 0.2,
             (Self::Top | Self::Under, Forearm) => 0.4,
             (Self::Top | Self::Under, Neck) => 0.8,
-            (Self::Top | Self::Under, Pelvis) => 0.0,
-            (Self::Top | Self::Under, Thigh) => LONG_TOP[0],
+            (Self::Top | Self::Under, Thigh) => 3.0,
             (Self::Top | Self::Under, Shin) => 8.0,
             (Self::Top | Self::Under, Head | Hand) => 6.0,
             (Self::Top | Self::Under, Foot) => IMPOSSIBLE,

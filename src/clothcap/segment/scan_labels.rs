@@ -1,85 +1,89 @@
 //! Labels carried from the template to the scan, with boundaries drawn along the scan's own colours.
 
-use super::color_mixture::hsv_cone;
+use super::color_mixture::{ColorMixture, hsv_cone};
 use super::labelling::Labelling;
 use super::prior::IMPOSSIBLE;
 use crate::CaptureError;
 use crate::align::SurfaceMatch;
 use crate::scan::BodyScan;
+use crate::settings::LabelSettings;
 use nalgebra::Vector3;
-use tryon_geometry::mesh::{Csr, Face};
+use tryon_body::Template;
+use tryon_geometry::mesh::Csr;
 use tryon_geometry::mrf::{ExpansionConfig, MrfModel};
 
-/// Width of the band about the template's boundaries in which the scan decides, rings of nodes.
-const BAND: u32 = 3;
-/// Cost of another label than the template's within the band, nats a ring.
-const PULL: f32 = 0.7;
-/// Cost of a label change between neighbours of equal colour, nats, and the share left across a change of colour.
-const SMOOTHNESS: [f32; 2] = [2.0, 0.2];
-/// Difference of colours that halves the rest.
-const CONTRAST: f32 = 0.08;
 /// Point whose label is not open.
 const NO_ROW: u32 = u32::MAX;
 
-/// Labels the points of a scan; `topology` gives the nodes' neighbours. Shape `[points]`.
-///
-/// # Errors
-/// [`CaptureError::Solve`] for an energy that is not finite.
-pub fn label_scan(
-    (scan, edges): (&BodyScan, &[[u32; 2]]),
-    matches: &[SurfaceMatch],
-    (faces, neighbours): (&[Face], &Csr),
-    labelling: &Labelling,
-) -> Result<Vec<u8>, CaptureError> {
-    let node_of = |m: &SurfaceMatch| faces[m.face as usize][m.nearest_corner()] as usize;
-    let start = matches
-        .iter()
-        .map(|m| u32::from(labelling.labels[node_of(m)]));
-    let mut labels: Vec<u32> = start.collect();
-    if scan.colors.is_empty() {
-        return Ok(labels.iter().map(|l| *l as u8).collect());
-    }
-    let depth = label_depths(neighbours, labelling);
-    let count = labelling.slots.len();
-    let of_node = |i: usize| {
-        let node = node_of(&matches[i]);
-        &depth[node * count..(node + 1) * count]
-    };
-    let is_open = |i: &usize| of_node(*i).iter().filter(|d| **d <= BAND).count() > 1;
-    let open: Vec<usize> = (0..matches.len()).filter(is_open).collect();
-    let colors: Vec<_> = scan.colors.iter().map(|c| hsv_cone(*c)).collect();
-    let unary: Vec<f32> = open
-        .iter()
-        .flat_map(|i| costs(labelling, of_node(*i), &colors[*i]))
-        .collect();
-    let mut energy = OpenPoints::new(labels.len(), &open, unary);
-    for &edge in edges {
-        let d = (colors[edge[0] as usize] - colors[edge[1] as usize]).norm() as f32 / CONTRAST;
-        let [full, rest] = SMOOTHNESS;
-        energy.join(edge, full * (rest + (1.0 - rest) / (1.0 + d * d)), &labels);
-    }
-    energy.solve(&open, &mut labels)?;
-    Ok(labels.iter().map(|l| *l as u8).collect())
+/// Scan whose labels are drawn from those of a template.
+#[derive(Clone, Copy, Debug)]
+pub struct ScanLabeller<'a> {
+    /// Scan.
+    pub scan: &'a BodyScan,
+    /// Its edges.
+    pub edges: &'a [[u32; 2]],
+    /// Place of each point on the template.
+    pub matches: &'a [SurfaceMatch],
+    /// Template.
+    pub template: &'a Template,
+    /// Settings of the segmentation.
+    pub settings: &'a LabelSettings,
 }
 
-/// Costs of all labels at a point: its colour, and rings from its node to the nearest one of each label.
-fn costs<'a>(
-    labelling: &'a Labelling,
-    rings: &'a [u32],
-    color: &'a Vector3<f64>,
-) -> impl Iterator<Item = f32> + 'a {
-    labelling
-        .appearances
-        .iter()
-        .zip(rings)
-        .map(|(look, rings)| {
+impl ScanLabeller<'_> {
+    /// Labels the points of the scan by those of the nodes. Shape `[points]`.
+    ///
+    /// # Errors
+    /// [`CaptureError::Solve`] for an energy that is not finite.
+    pub fn run(&self, labelling: &Labelling) -> Result<Vec<u8>, CaptureError> {
+        let settings = &self.settings.scan;
+        let faces = self.template.mesh().faces();
+        let node_of = |m: &SurfaceMatch| m.nearest_vertex(faces) as usize;
+        let matches = self.matches.iter();
+        let start = matches.map(|m| u32::from(labelling.labels[node_of(m)]));
+        let mut labels: Vec<u32> = start.collect();
+        if self.scan.colors.is_empty() {
+            return Ok(labels.iter().map(|l| *l as u8).collect());
+        }
+        let neighbours = self.template.topology().vertex_neighbours();
+        let depth = label_depths(neighbours, labelling, settings.band);
+        let count = labelling.slots.len();
+        let of_node = |i: usize| {
+            let node = node_of(&self.matches[i]);
+            &depth[node * count..(node + 1) * count]
+        };
+        let is_near = |d: &&u32| **d <= settings.band;
+        let is_open = |i: &usize| of_node(*i).iter().filter(is_near).count() > 1;
+        let open: Vec<usize> = (0..labels.len()).filter(is_open).collect();
+        let colors: Vec<_> = self.scan.colors.iter().map(|c| hsv_cone(*c)).collect();
+        let costs = |i: &usize| self.costs(labelling, of_node(*i), &colors[*i]);
+        let unary: Vec<f32> = open.iter().flat_map(costs).collect();
+        let mut energy = OpenPoints::new(labels.len(), &open, unary);
+        let (full, rest) = (settings.smoothness, settings.least_smoothness);
+        for &edge in self.edges {
+            let [a, b] = edge.map(|v| colors[v as usize]);
+            let d = (a - b).norm() as f32 / settings.contrast;
+            energy.join(edge, full * (rest + (1.0 - rest) / (1.0 + d * d)), &labels);
+        }
+        energy.solve(&open, &mut labels)?;
+        Ok(labels.iter().map(|l| *l as u8).collect())
+    }
+
+    /// Costs of all labels at a point: its colour, and rings from its node to the nearest one of each label.
+    fn costs(&self, labelling: &Labelling, rings: &[u32], color: &Vector3<f64>) -> Vec<f32> {
+        let settings = &self.settings.scan;
+        let outliers = self.settings.colors.outliers;
+        let cost = |(look, rings): (&Option<ColorMixture>, &u32)| {
             let pull = match *rings {
                 0 => 0.0,
-                d if d <= BAND => PULL * d as f32,
+                d if d <= settings.band => settings.pull * d as f32,
                 _ => IMPOSSIBLE,
             };
-            look.as_ref().map_or(0.0, |a| a.cost(color) as f32) + pull
-        })
+            let look = look.as_ref();
+            look.map_or(0.0, |a| a.cost(color, outliers) as f32) + pull
+        };
+        labelling.appearances.iter().zip(rings).map(cost).collect()
+    }
 }
 
 /// Energy of the points that may have more than one label; the others hold their neighbours.
@@ -140,10 +144,7 @@ impl OpenPoints {
         let mut found: Vec<u32> = open.iter().map(|i| labels[*i]).collect();
         model
             .expand(&self.unary, &mut found, &ExpansionConfig::default())
-            .map_err(|e| CaptureError::Solve {
-                stage: "labels of the scan",
-                why: e.to_string(),
-            })?;
+            .map_err(|e| CaptureError::solve("labels of the scan", e))?;
         for (i, label) in open.iter().zip(found) {
             labels[*i] = label;
         }
@@ -151,15 +152,15 @@ impl OpenPoints {
     }
 }
 
-/// Rings from each node to the nearest one of each label, at most one beyond [`BAND`]; shape `[nodes, labels]`.
-fn label_depths(neighbours: &Csr, labelling: &Labelling) -> Vec<u32> {
+/// Rings from each node to the nearest one of each label, at most one beyond the band; shape `[nodes, labels]`.
+fn label_depths(neighbours: &Csr, labelling: &Labelling, band: u32) -> Vec<u32> {
     let count = labelling.slots.len();
     let nodes = labelling.labels.len();
-    let mut depth = vec![BAND + 1; nodes * count];
+    let mut depth = vec![band + 1; nodes * count];
     for (v, l) in labelling.labels.iter().enumerate() {
         depth[v * count + usize::from(*l)] = 0;
     }
-    for ring in 1..=BAND {
+    for ring in 1..=band {
         for v in 0..nodes {
             for l in 0..count {
                 let reached = |w: &u32| depth[*w as usize * count + l] == ring - 1;

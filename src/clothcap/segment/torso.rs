@@ -1,51 +1,32 @@
 //! Garments of the torso: the two colours of torso and arms that are least like shades or prints of each other.
 
-use super::color_mixture::{ColorMixture, k_means};
-use super::labelling::{LEAST_UNLIKE_SKIN, Labeller};
+use super::color_mixture::k_means;
+use super::labelling::Labeller;
 use nalgebra::Vector3;
-
-/// Clusters in which the colours of torso and arms start; each way to join them to two is tried.
-const CLUSTERS: usize = 6;
-/// Least share of torso and arms that is a garment of its own.
-const LEAST_SHARE: f64 = 0.04;
-/// Least step of colour where two garments meet, in standard deviations of their colours: light fades, cloth ends. Shades of
-/// one garment have up to 0.86, the garments of `scans/liam` 1.7, jackets over shirts 1.4 to 1.9.
-const LEAST_STEP: f64 = 1.1;
-/// Largest ratio of edges between two garments to those within the smaller one: stripes, checks and spots have more than 0.8.
-const MOST_MIXED: f64 = 0.5;
-/// Least share of its border at which a garment meets skin or the garment of the legs: prints meet their own garment only.
-const LEAST_FREE: f64 = 0.05;
-/// Brightness added before colours are divided by it: hues of dark colours are noise.
-const DARK: f64 = 0.1;
-/// Weight of the logarithm of brightness beside hue and saturation: light changes it, dyes do too.
-const BRIGHTNESS: f64 = 0.4;
 
 /// Two sets of nodes, and the ways in which they look like two garments.
 #[derive(Debug)]
 struct TorsoPair {
     nodes: [Vec<usize>; 2],
-    /// See [`LEAST_STEP`].
+    /// Step of colour where they meet, in standard deviations of their colours.
     step: f64,
 }
 
 impl Labeller<'_> {
     /// Looks for two garments on torso and arms, and keeps which node is whose.
     pub(super) fn find_second_top(&mut self) -> bool {
+        let settings = &self.config.settings;
         let (some, inner) = self.torso_nodes();
-        let colors: Vec<_> = inner
-            .iter()
-            .filter_map(|v| self.without_light(*v))
-            .collect();
-        let owner = k_means(&colors, CLUSTERS);
+        let colors = self.colors(&inner);
+        let owner = k_means(&colors, settings.torso.clusters, &settings.colors);
         let count = owner.iter().max().map_or(0, |k| k + 1);
         // The last cluster stays on one side: the other half of the ways says the same.
         let ways = 1..1usize << count.saturating_sub(1);
         let pairs = ways.filter_map(|way| {
             let side = |wanted: usize| {
                 let own = inner.iter().zip(&owner);
-                own.filter(|(_, k)| way >> **k & 1 == wanted)
-                    .map(|(v, _)| *v)
-                    .collect()
+                let own = own.filter(|(_, k)| way >> **k & 1 == wanted);
+                own.map(|(v, _)| *v).collect()
             };
             self.torso_pair([side(0), side(1)])
         });
@@ -54,25 +35,21 @@ impl Labeller<'_> {
             return false;
         };
         let on_torso = |all: &[usize]| all.iter().filter(|v| self.regions[**v].is_torso()).count();
-        let (first, second) = if on_torso(&a) >= on_torso(&b) {
-            (a, b)
-        } else {
-            (b, a)
-        };
+        let is_first = on_torso(&a) >= on_torso(&b);
+        let (first, second) = if is_first { (a, b) } else { (b, a) };
         let [first, second] = [first, second].map(|all| mean(&self.colors(&all)));
         for v in some {
-            let is_second = self
-                .without_light(v)
-                .map(|c| (c - second).norm() < (c - first).norm());
-            self.second_top[v] = is_second;
+            let is_second = |c: Vector3<f64>| (c - second).norm() < (c - first).norm();
+            self.second_top[v] = self.without_light(v).map(is_second);
         }
         true
     }
 
     /// Two sets of nodes as garments; `None` if they are shades, prints or skin.
     fn torso_pair(&self, nodes: [Vec<usize>; 2]) -> Option<TorsoPair> {
+        let settings = &self.config.settings.torso;
         let [a, b] = nodes.each_ref().map(Vec::len);
-        if (a.min(b) as f64) < LEAST_SHARE * (a + b) as f64 {
+        if (a.min(b) as f64) < settings.least_share * (a + b) as f64 {
             return None;
         }
         let mut side = vec![None; self.count()];
@@ -84,9 +61,12 @@ impl Labeller<'_> {
         let meets = self.meetings(&side, &axis);
         let mixed = meets.between as f64 / meets.within.into_iter().min()?.max(1) as f64;
         let step = meets.step / meets.between.max(1) as f64 / spread;
-        let free =
-            |k: usize| meets.free[k] as f64 >= LEAST_FREE * (meets.free[k] + meets.between) as f64;
-        let is_pair = mixed < MOST_MIXED && step >= LEAST_STEP && free(0) && free(1);
+        let free = |k: usize| {
+            let all = meets.free[k] + meets.between;
+            meets.free[k] as f64 >= settings.least_free * all as f64
+        };
+        let is_alone = mixed < settings.most_mixed && step >= settings.least_step;
+        let is_pair = is_alone && free(0) && free(1);
         let is_worn = || nodes.iter().all(|all| self.is_unlike_skin(all));
         (is_pair && is_worn()).then_some(TorsoPair { nodes, step })
     }
@@ -111,11 +91,11 @@ impl Labeller<'_> {
     }
 
     fn is_unlike_skin(&self, nodes: &[usize]) -> bool {
-        let own = ColorMixture::fit(&self.nodes.of(nodes.iter().copied()));
+        let own = self.nodes.appearance(nodes.iter().copied());
         let (Some(own), Some(skin)) = (own, self.skin_appearance()) else {
             return true;
         };
-        self.excess(nodes.iter().copied(), (&own, &skin)) > LEAST_UNLIKE_SKIN
+        self.excess(nodes.iter().copied(), &own, &skin) > self.config.settings.unlike_skin
     }
 
     /// Seen nodes of torso and arms that are neither skin nor the garment of the legs, and those of them that do not border on
@@ -123,40 +103,36 @@ impl Labeller<'_> {
     fn torso_nodes(&self) -> (Vec<usize>, Vec<usize>) {
         let skin = self.skin_appearance();
         let is_skin = |v: usize| {
-            let cost = skin
-                .as_ref()
-                .map_or(f64::INFINITY, |s| self.nodes.cost(v, s));
-            self.regions[v].is_arm() && cost < 0.0
+            let is_like = |s| self.nodes.cost(v, s) < 0.0;
+            self.regions[v].is_arm() && skin.as_ref().is_some_and(is_like)
         };
-        let other: Vec<bool> = (0..self.count())
-            .map(|v| self.bottom[v] || is_skin(v))
-            .collect();
+        let other = (0..self.count()).map(|v| self.bottom[v] || is_skin(v));
+        let other: Vec<bool> = other.collect();
         let mut near = other.clone();
         for [p, q] in self.edges.iter().map(|e| e.map(|v| v as usize)) {
             near[p] |= other[q];
             near[q] |= other[p];
         }
         let region = |v: &usize| self.regions[*v];
-        let all: Vec<usize> = (0..self.count())
-            .filter(|v| region(v).is_torso() || region(v).is_arm())
-            .filter(|v| self.nodes.means[*v].is_some() && !other[*v])
-            .collect();
+        let all = (0..self.count()).filter(|v| region(v).is_torso() || region(v).is_arm());
+        let all = all.filter(|v| self.nodes.means[*v].is_some() && !other[*v]);
+        let all: Vec<usize> = all.collect();
         let inner = all.iter().filter(|v| !near[**v]).copied().collect();
         (all, inner)
     }
 
-    fn colors(&self, nodes: &[usize]) -> Vec<Vector3<f64>> {
-        nodes
-            .iter()
-            .filter_map(|v| self.without_light(*v))
-            .collect()
+    pub(super) fn colors(&self, nodes: &[usize]) -> Vec<Vector3<f64>> {
+        let colors = nodes.iter().filter_map(|v| self.without_light(*v));
+        colors.collect()
     }
 
     /// Mean colour of a node with little of its light left: hue and saturation, and the logarithm of brightness.
     pub(super) fn without_light(&self, node: usize) -> Option<Vector3<f64>> {
+        let settings = &self.config.settings.torso;
         self.nodes.means[node].map(|c| {
-            let bright = c.z + DARK;
-            Vector3::new(c.x / bright, c.y / bright, BRIGHTNESS * bright.ln())
+            let bright = c.z + settings.dark;
+            let hue = [c.x / bright, c.y / bright];
+            Vector3::new(hue[0], hue[1], settings.brightness * bright.ln())
         })
     }
 }

@@ -4,22 +4,15 @@ use super::labelling::Labelling;
 use super::node_colors::NodeColors;
 use super::prior::BodyRegion;
 use crate::align::SurfaceMatch;
+use crate::settings::LabelSettings;
 use std::collections::BTreeMap;
 use tryon_body::Template;
 use tryon_geometry::math::V3;
 
-/// Height of a slice across a bone, metres.
-const SLICE: f32 = 0.02;
-/// Share of a slice's nodes with a scan point from which it is seen: one side of a limb has a third.
-const SEEN: f64 = 0.1;
-/// Share of a region's vertices with a point below which the region is unseen.
-const SEEN_OF_REGION: f64 = 0.2;
-/// Distance up to which a point shows the surface below it, metres.
-const NEAR: f32 = 0.03;
-
 /// Nodes in slices of their bone that the scan shows, or next to one that it shows; shape `[nodes]`.
 pub fn seen_slices(template: &Template, nodes: &NodeColors) -> Vec<bool> {
-    let slices = bone_slices(template, SLICE);
+    let settings = &nodes.settings.unseen;
+    let slices = bone_slices(template, settings.slice);
     let mut counts: BTreeMap<(usize, i32), (usize, usize)> = BTreeMap::new();
     for (v, slice) in slices.iter().enumerate() {
         let count = counts.entry(*slice).or_default();
@@ -28,18 +21,22 @@ pub fn seen_slices(template: &Template, nodes: &NodeColors) -> Vec<bool> {
     }
     let is_seen = |slice: &(usize, i32)| {
         let count = counts.get(slice);
-        count.is_some_and(|(seen, all)| *seen as f64 >= SEEN * *all as f64)
+        count.is_some_and(|(seen, all)| *seen as f64 >= settings.slice_share * *all as f64)
     };
     let near = |(bone, k): &(usize, i32)| (k - 1..=k + 1).any(|k| is_seen(&(*bone, k)));
     slices.iter().map(near).collect()
 }
 
 /// Regions of the body of which hardly a vertex has a point; `template` is that of the matches' faces.
-pub fn unseen_regions(template: &Template, matches: &[SurfaceMatch]) -> Vec<BodyRegion> {
+pub fn unseen_regions(
+    template: &Template,
+    matches: &[SurfaceMatch],
+    settings: &LabelSettings,
+) -> Vec<BodyRegion> {
     let faces = template.mesh().faces();
     let regions = BodyRegion::of_vertices(template);
     let mut seen = vec![false; regions.len()];
-    let shows = |m: &&SurfaceMatch| m.weight > 0.0 && m.distance < NEAR;
+    let shows = |m: &&SurfaceMatch| m.weight > 0.0 && m.distance < settings.near;
     for m in matches.iter().filter(shows) {
         for v in faces[m.face as usize] {
             seen[v as usize] = true;
@@ -50,7 +47,8 @@ pub fn unseen_regions(template: &Template, matches: &[SurfaceMatch]) -> Vec<Body
         own().filter(|(_, s)| **s).count() as f64 / own().count().max(1) as f64
     };
     let all = BodyRegion::ALL.into_iter();
-    all.filter(|r| share(*r) < SEEN_OF_REGION).collect()
+    all.filter(|r| share(*r) < settings.unseen.region_share)
+        .collect()
 }
 
 /// Bone of each node, and slice across it, `height` metres thick; shape `[nodes]`.

@@ -2,6 +2,7 @@
 
 use super::charts::{Chart, charts};
 use super::packing::{Packing, packed};
+use crate::settings::ChartSettings;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use tryon_geometry::math::P3;
@@ -13,11 +14,6 @@ const WIDTHS: [u32; 8] = [64, 128, 192, 256, 384, 512, 768, 1024];
 const LONGEST: u32 = WIDTHS[WIDTHS.len() - 1];
 /// Texels left free around a chart: bilinear samples and two halvings of the image stay within it.
 const GUTTER: u32 = 3;
-/// Side of a texel from which no larger one is tried, metres.
-const LARGEST: f32 = 1.0;
-/// Halvings of the interval in which the size of a texel is searched.
-const BISECTIONS: usize = 20;
-
 /// Size of an atlas.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct AtlasSize {
@@ -55,9 +51,10 @@ impl TextureAtlas {
     /// Atlas of a surface at rest: y up, facing +z, metres. Texels have sides of `texel` metres on the cloth, or larger
     /// ones where the image would be too large.
     pub fn new(vertices: &[P3], faces: &[Face], texel: f32) -> Self {
-        let charts = charts(vertices, faces);
+        let settings = ChartSettings::default();
+        let charts = charts(vertices, faces, &settings);
         let flat = FlatCharts::new(&charts, vertices, faces);
-        let (size, packing) = flat.fit(texel);
+        let (size, packing) = flat.fit(texel, &settings);
         let mut out = Self {
             size,
             vertex: Vec::new(),
@@ -66,7 +63,7 @@ impl TextureAtlas {
         };
         let extent = [size.width as f32, size.height as f32];
         for (k, chart) in charts.iter().enumerate() {
-            let (low, corner) = (flat.bounds[k].0, packing.corners[k]);
+            let (low, corner) = (flat.bounds[k][0], packing.corners[k]);
             let mut own: BTreeMap<u32, u32> = BTreeMap::new();
             for f in &chart.faces {
                 out.faces[*f as usize] = faces[*f as usize].map(|v| {
@@ -135,56 +132,49 @@ impl TextureAtlas {
     /// # Errors
     /// Field and fault.
     pub fn check(&self, vertices: usize, faces: usize) -> Result<(), (&'static str, String)> {
-        let fault = |is_fault: bool, field, why: &str| {
-            if is_fault {
-                Err((field, why.to_owned()))
-            } else {
-                Ok(())
-            }
-        };
         let AtlasSize {
             width,
             height,
             texel,
         } = self.size;
         let is_size = |s| (1..=LONGEST).contains(&s);
-        fault(!is_size(width) || !is_size(height), "size", "not an image")?;
-        fault(
-            !(texel > 0.0 && texel.is_finite()),
-            "size.texel",
-            "not positive",
-        )?;
-        fault(
-            self.uv.len() != self.vertex.len(),
-            "uv",
-            "one for each vertex expected",
-        )?;
-        let beyond = |v: &u32| *v as usize >= vertices;
-        fault(
-            self.vertex.iter().any(beyond),
-            "vertex",
-            "beyond the garment's",
-        )?;
         let outside = |t: &[f32; 2]| t.iter().any(|c| !(0.0..=1.0).contains(c));
-        fault(self.uv.iter().any(outside), "uv", "outside of the image")?;
-        fault(
-            self.faces.len() != faces,
-            "faces",
-            "one for each of the garment's expected",
-        )?;
-        let beyond = |v: &u32| *v as usize >= self.vertex.len();
-        fault(
-            self.faces.iter().flatten().any(beyond),
-            "faces",
-            "beyond its vertices",
-        )
+        let own = self.vertex.len();
+        let mut corners = self.faces.iter().flatten();
+        let faults = [
+            (!is_size(width) || !is_size(height), "size", "not an image"),
+            (
+                !(texel > 0.0 && texel.is_finite()),
+                "size.texel",
+                "not positive",
+            ),
+            (self.uv.len() != own, "uv", "one for each vertex expected"),
+            (
+                self.vertex.iter().any(|v| *v as usize >= vertices),
+                "vertex",
+                "beyond the garment's",
+            ),
+            (self.uv.iter().any(outside), "uv", "outside of the image"),
+            (
+                self.faces.len() != faces,
+                "faces",
+                "one for each of the garment's expected",
+            ),
+            (
+                corners.any(|v| *v as usize >= own),
+                "faces",
+                "beyond its vertices",
+            ),
+        ];
+        let fault = faults.into_iter().find(|(is_fault, ..)| *is_fault);
+        fault.map_or(Ok(()), |(_, field, why)| Err((field, why.to_owned())))
     }
 }
 
-/// Bounds of charts in their planes, metres.
+/// Charts in their planes.
 struct FlatCharts {
-    /// Least and greatest coordinates of each chart.
-    bounds: Vec<([f32; 2], [f32; 2])>,
+    /// Least and greatest coordinates of each chart, metres.
+    bounds: Vec<[[f32; 2]; 2]>,
 }
 
 impl FlatCharts {
@@ -192,15 +182,12 @@ impl FlatCharts {
         let bounds = |chart: &Chart| {
             let corners = chart.faces.iter().flat_map(|f| faces[*f as usize]);
             let points = corners.map(|v| chart.project(&vertices[v as usize]));
-            points.fold(
-                ([f32::INFINITY; 2], [f32::NEG_INFINITY; 2]),
-                |(low, high), p| {
-                    (
-                        [0, 1].map(|k| low[k].min(p[k])),
-                        [0, 1].map(|k| high[k].max(p[k])),
-                    )
-                },
-            )
+            let mut bounds = [[f32::INFINITY; 2], [f32::NEG_INFINITY; 2]];
+            for (p, k) in points.flat_map(|p| [(p, 0), (p, 1)]) {
+                bounds[0][k] = bounds[0][k].min(p[k]);
+                bounds[1][k] = bounds[1][k].max(p[k]);
+            }
+            bounds
         };
         Self {
             bounds: charts.iter().map(bounds).collect(),
@@ -209,28 +196,27 @@ impl FlatCharts {
 
     /// Smallest image with texels of this size.
     fn packed(&self, texel: f32) -> Option<(u32, Packing)> {
-        let size = |(low, high): &([f32; 2], [f32; 2])| {
+        let size = |[low, high]: &[[f32; 2]; 2]| {
             let texels = |k: usize| ((high[k] - low[k]) / texel).ceil().min(1e6) as u32;
             [0, 1].map(|k| texels(k) + 1 + 2 * GUTTER)
         };
         let sizes: Vec<[u32; 2]> = self.bounds.iter().map(size).collect();
-        let all = WIDTHS
-            .iter()
-            .filter_map(|w| Some((*w, packed(&sizes, *w)?)));
+        let of_width = |w: &u32| Some((*w, packed(&sizes, *w)?));
+        let all = WIDTHS.iter().filter_map(of_width);
         let some = all.filter(|(_, p)| p.height <= LONGEST);
         some.min_by_key(|(width, p)| width * p.height)
     }
 
     /// Smallest image with texels of the wanted size, or of the smallest size that the largest image has room for.
-    fn fit(&self, texel: f32) -> (AtlasSize, Packing) {
+    fn fit(&self, texel: f32, settings: &ChartSettings) -> (AtlasSize, Packing) {
         let mut best = self.packed(texel);
         let (mut low, mut high) = (texel, texel);
-        while best.is_none() && high < LARGEST {
+        while best.is_none() && high < settings.largest_texel {
             (low, high) = (high, 2.0 * high);
             best = self.packed(high);
         }
         if high > texel {
-            for _ in 0..BISECTIONS {
+            for _ in 0..settings.bisections {
                 let middle = 0.5 * (low + high);
                 match self.packed(middle) {
                     Some(found) => (best, high) = (Some(found), middle),
@@ -240,8 +226,7 @@ impl FlatCharts {
         }
         // More charts than an image has room for lie over each other.
         let over = || {
-            let corners = vec![[0; 2]; self.bounds.len()];
-            let height = LONGEST;
+            let (corners, height) = (vec![[0; 2]; self.bounds.len()], LONGEST);
             (LONGEST, Packing { corners, height })
         };
         let (width, packing) = best.unwrap_or_else(over);

@@ -1,29 +1,12 @@
 //! Charts of a surface: connected faces that look along one axis, projected along it without overlap.
 
+use crate::settings::ChartSettings;
 use std::collections::BTreeMap;
 use tryon_geometry::math::{P3, V3};
 use tryon_geometry::mesh::{Csr, Face, edge_faces, face_normal};
 
-/// Axes of projection: garments at rest face +z and stand along +y.
-const AXES: [[f32; 3]; 6] = [
-    [0.0, 0.0, 1.0],
-    [0.0, 0.0, -1.0],
-    [1.0, 0.0, 0.0],
-    [-1.0, 0.0, 0.0],
-    [0.0, 1.0, 0.0],
-    [0.0, -1.0, 0.0],
-];
-/// Gain of an axis for each neighbour that has it, beside the cosine to the face's normal: larger values give fewer
-/// charts, with more distortion.
-const NEIGHBOUR: f32 = 0.3;
-/// Least cosine between a face and the axis that it takes from its neighbours: stretches by 3 at most.
-const STEEPEST: f32 = 0.33;
-/// Rounds over all faces.
-const ROUNDS: usize = 8;
-/// Number of faces below which a chart is given to its neighbours where their axes allow it.
-const LEAST_FACES: usize = 24;
-/// Side of a cell of the search for overlaps, metres.
-const CELL: f32 = 0.002;
+/// Number of axes of projection: both directions of z, x and y. Garments at rest face +z and stand along +y.
+const AXES: usize = 6;
 
 /// Faces that are projected along one axis.
 #[derive(Clone, Debug, PartialEq)]
@@ -40,8 +23,15 @@ impl Chart {
     }
 }
 
+/// Unit vector along an axis of projection.
+fn outward(axis: usize) -> V3 {
+    let mut out = V3::zeros();
+    out[[2, 0, 1][axis / 2]] = if axis.is_multiple_of(2) { 1.0 } else { -1.0 };
+    out
+}
+
 fn project(axis: usize, p: &P3) -> [f32; 2] {
-    let out = V3::from(AXES[axis]);
+    let out = outward(axis);
     let up = match axis {
         4 => -V3::z(),
         5 => V3::z(),
@@ -51,20 +41,23 @@ fn project(axis: usize, p: &P3) -> [f32; 2] {
 }
 
 /// Cuts a surface into charts; every face is in one. Their order depends on nothing but the arguments.
-pub(super) fn charts(vertices: &[P3], faces: &[Face]) -> Vec<Chart> {
+pub(super) fn charts(vertices: &[P3], faces: &[Face], settings: &ChartSettings) -> Vec<Chart> {
     let around = face_neighbours(faces);
-    let normals: Vec<V3> = faces
-        .iter()
-        .map(|f| face_normal(vertices, f).try_normalize(0.0))
-        .map(|n| n.unwrap_or(V3::z()))
-        .collect();
-    let mut axes = smoothed_axes(&normals, &around);
-    absorb_small(&mut axes, &normals, &around);
-    let mut out = Vec::new();
-    for (axis, faces_of) in components(&axes, &around) {
-        separate(vertices, faces, &around, (axis, faces_of), &mut out);
+    let normal = |f| face_normal(vertices, f).try_normalize(0.0);
+    let normals: Vec<V3> = faces.iter().map(|f| normal(f).unwrap_or(V3::z())).collect();
+    let mut axes = smoothed_axes(&normals, &around, settings);
+    absorb_small(&mut axes, &normals, &around, settings);
+    let mut layers = ChartLayers {
+        vertices,
+        faces,
+        around: &around,
+        cell: settings.cell,
+        charts: Vec::new(),
+    };
+    for (axis, own) in components(&axes, &around) {
+        layers.add(axis, own);
     }
-    out
+    layers.charts
 }
 
 /// Neighbours of each face across its sides.
@@ -81,28 +74,29 @@ fn face_neighbours(faces: &[Face]) -> Csr {
 }
 
 fn cosine(axis: usize, normal: &V3) -> f32 {
-    V3::from(AXES[axis]).dot(normal)
+    outward(axis).dot(normal)
 }
 
 /// Axis of each face: near its normal, and that of its neighbours where it can be (iterated conditional modes).
-fn smoothed_axes(normals: &[V3], around: &Csr) -> Vec<usize> {
+fn smoothed_axes(normals: &[V3], around: &Csr, settings: &ChartSettings) -> Vec<usize> {
     let best = |score: &dyn Fn(usize) -> f32| {
-        let axes = (0..AXES.len()).map(|a| (score(a), a));
+        let axes = (0..AXES).map(|a| (score(a), a));
         let best = axes.reduce(|best, next| if next.0 > best.0 { next } else { best });
         best.map_or(0, |b| b.1)
     };
     let mut axes: Vec<usize> = normals.iter().map(|n| best(&|a| cosine(a, n))).collect();
-    for _ in 0..ROUNDS {
+    for _ in 0..settings.rounds {
         for (f, n) in normals.iter().enumerate() {
             let row = around.row(f);
             axes[f] = best(&|a| {
                 let cos = cosine(a, n);
                 let alike = row.iter().filter(|g| axes[**g as usize] == a).count();
                 // An axis at a right angle would flatten the face.
-                if cos < STEEPEST {
-                    cos - 2.0
+                let is_steep = cos < settings.steepest;
+                cos + if is_steep {
+                    -2.0
                 } else {
-                    cos + NEIGHBOUR * alike as f32
+                    settings.neighbour * alike as f32
                 }
             });
         }
@@ -121,62 +115,65 @@ fn components(axes: &[usize], around: &Csr) -> Vec<(usize, Vec<u32>)> {
 }
 
 /// Gives the faces of small charts to their neighbours.
-fn absorb_small(axes: &mut [usize], normals: &[V3], around: &Csr) {
+fn absorb_small(axes: &mut [usize], normals: &[V3], around: &Csr, settings: &ChartSettings) {
     for (own_axis, own) in components(axes, around) {
-        if own.len() >= LEAST_FACES {
+        if own.len() >= settings.least_faces {
             continue;
         }
         for f in own {
             let f = f as usize;
+            let cos = |axis: &usize| cosine(*axis, &normals[f]);
             let beside = around.row(f).iter().map(|g| axes[*g as usize]);
-            let other = beside.filter(|a| *a != own_axis && cosine(*a, &normals[f]) > STEEPEST);
-            let best = other.max_by(|a, b| {
-                cosine(*a, &normals[f])
-                    .total_cmp(&cosine(*b, &normals[f]))
-                    .then(b.cmp(a))
-            });
+            let other = beside.filter(|a| *a != own_axis && cos(a) > settings.steepest);
+            let best = other.max_by(|a, b| cos(a).total_cmp(&cos(b)).then(b.cmp(a)));
             axes[f] = best.unwrap_or(own_axis);
         }
     }
 }
 
-/// Adds connected faces as a chart; faces that lie over others of it in its plane become charts of their own.
-fn separate(
-    vertices: &[P3],
-    faces: &[Face],
-    around: &Csr,
-    (axis, own): (usize, Vec<u32>),
-    out: &mut Vec<Chart>,
-) {
-    let mut left = own;
-    while !left.is_empty() {
-        let mut cells: BTreeMap<[i32; 2], Vec<[[f32; 2]; 3]>> = BTreeMap::new();
-        let (mut kept, mut over) = (Vec::new(), Vec::new());
-        for f in breadth_first(&left, around) {
-            let t = faces[f as usize].map(|v| project(axis, &vertices[v as usize]));
-            let [low, high] = [f32::min, f32::max].map(|pick: fn(f32, f32) -> f32| {
-                [0, 1]
-                    .map(|k| (pick(pick(t[0][k], t[1][k]), t[2][k]) / (8.0 * CELL)).floor() as i32)
-            });
-            let reached =
-                || (low[0]..=high[0]).flat_map(|x| (low[1]..=high[1]).map(move |y| [x, y]));
-            let is_over = reached().any(|c| {
-                let there = cells.get(&c).into_iter().flatten();
-                there.into_iter().any(|other| overlap(&t, other))
-            });
-            if is_over {
-                over.push(f);
-                continue;
+/// Charts of a surface, without overlap.
+struct ChartLayers<'a> {
+    vertices: &'a [P3],
+    faces: &'a [Face],
+    around: &'a Csr,
+    /// Side of a cell of the search for overlaps, metres.
+    cell: f32,
+    charts: Vec<Chart>,
+}
+
+impl ChartLayers<'_> {
+    /// Adds connected faces as a chart; faces that lie over others of it in its plane become charts of their own.
+    fn add(&mut self, axis: usize, own: Vec<u32>) {
+        let mut left = own;
+        while !left.is_empty() {
+            let mut cells: BTreeMap<[i32; 2], Vec<[[f32; 2]; 3]>> = BTreeMap::new();
+            let (mut kept, mut over) = (Vec::new(), Vec::new());
+            for f in breadth_first(&left, self.around) {
+                let t = self.faces[f as usize].map(|v| project(axis, &self.vertices[v as usize]));
+                let [low, high] = [f32::min, f32::max].map(|pick: fn(f32, f32) -> f32| {
+                    [0, 1]
+                        .map(|k| (pick(pick(t[0][k], t[1][k]), t[2][k]) / self.cell).floor() as i32)
+                });
+                let reached =
+                    || (low[0]..=high[0]).flat_map(|x| (low[1]..=high[1]).map(move |y| [x, y]));
+                let is_over = reached().any(|c| {
+                    let there = cells.get(&c).into_iter().flatten();
+                    there.into_iter().any(|other| overlap(&t, other))
+                });
+                if is_over {
+                    over.push(f);
+                    continue;
+                }
+                kept.push(f);
+                for c in reached() {
+                    cells.entry(c).or_default().push(t);
+                }
             }
-            kept.push(f);
-            for c in reached() {
-                cells.entry(c).or_default().push(t);
-            }
+            kept.sort_unstable();
+            over.sort_unstable();
+            self.charts.push(Chart { faces: kept, axis });
+            left = over;
         }
-        kept.sort_unstable();
-        over.sort_unstable();
-        out.push(Chart { faces: kept, axis });
-        left = over;
     }
 }
 

@@ -133,10 +133,8 @@ impl GarmentTexture {
                 ];
                 for n in beside.into_iter().flatten() {
                     if !std::mem::replace(&mut is_filled[n as usize], true) {
-                        let from = 3 * t as usize;
-                        self.image
-                            .data_mut()
-                            .copy_within(from..from + 3, 3 * n as usize);
+                        let (from, to) = (3 * t as usize, 3 * n as usize);
+                        self.image.data_mut().copy_within(from..from + 3, to);
                         next.push(n);
                     }
                 }

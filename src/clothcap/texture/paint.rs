@@ -3,23 +3,11 @@
 use super::atlas::TextureAtlas;
 use super::image::GarmentTexture;
 use crate::scan::{BodyScan, TextureColor, mean_spacing};
+use crate::settings::PaintSettings;
 use tryon_geometry::math::{P3, V3};
 use tryon_geometry::mesh::Face;
 use tryon_geometry::par::{self, Par};
 use tryon_geometry::spatial::{Bvh, HashGrid};
-
-/// Smallest cosine between the normals of a point and of the garment.
-const NORMALS: f32 = 0.2;
-/// Largest distance of a point from the garment that it colours, metres.
-const NEAR: f32 = 0.03;
-/// Width of the kernel over the distance between points: larger values blur prints, smaller ones show single points.
-const SIGMA: f32 = 0.5;
-/// Reach of the kernel over its width.
-const REACH: f32 = 3.0;
-/// Sum of the kernel's weights from which a texel counts as seen: a point at a distance of 2.4 widths.
-const SEEN: f32 = 0.056;
-/// Weight of the interpolated colours of the vertices beside the points': joins what was seen to what is filled in.
-const FILLED: f32 = 0.005;
 
 /// Coloured points of one garment on its posed surface.
 pub(crate) struct ScanPaint {
@@ -29,6 +17,7 @@ pub(crate) struct ScanPaint {
     grid: HashGrid,
     /// Width of the kernel, metres.
     sigma: f32,
+    settings: PaintSettings,
 }
 
 impl ScanPaint {
@@ -36,35 +25,34 @@ impl ScanPaint {
     pub(crate) fn new(
         scan: &BodyScan,
         is_own: impl Fn(usize) -> bool,
-        (faces, vertices): (&[Face], &[P3]),
+        faces: &[Face],
+        vertices: &[P3],
+        settings: &PaintSettings,
     ) -> Self {
         let bvh = Bvh::new(faces, vertices);
         let own: Vec<TextureColor> = colors(scan).filter(|c| is_own(c.point as usize)).collect();
         let mut found = Vec::new();
         par::map_into(Par::Rayon, own.len(), 256, &mut found, |k| {
-            let normal = scan.normal(own[k].point as usize);
             let at = bvh.closest(vertices, &own[k].at)?;
             let face_normal = bvh.unit_normal(vertices, at.face)?;
-            (normal.agrees(&face_normal, NORMALS) && at.distance < NEAR).then_some(at.point)
+            let agrees = scan.agrees(own[k].point as usize, &face_normal, settings.normals);
+            (agrees && at.distance < settings.near).then_some(at.point)
         });
-        let (points, colors): (Vec<P3>, Vec<[f32; 3]>) = found
-            .iter()
-            .zip(&own)
-            .filter_map(|(p, c)| Some(((*p)?, c.color.map(f32::from))))
-            .unzip();
-        let sigma = SIGMA * mean_spacing(&points);
+        let found = found.iter().zip(&own);
+        let found = found.filter_map(|(p, c)| Some(((*p)?, c.color.map(f32::from))));
+        let (points, colors): (Vec<P3>, Vec<[f32; 3]>) = found.unzip();
+        let sigma = settings.sigma * mean_spacing(&points);
         let mut grid = HashGrid::default();
-        let longest = faces
-            .iter()
-            .map(|f| radius(&f.map(|v| vertices[v as usize])))
-            .fold(0.0, f32::max);
+        let radius_of = |f: &Face| radius(&f.map(|v| vertices[v as usize]));
+        let longest = faces.iter().map(radius_of).fold(0.0, f32::max);
         // Searches reach half a cell.
-        grid.fill(&points, 2.0 * (longest + REACH * sigma));
+        grid.fill(&points, 2.0 * (longest + settings.reach * sigma));
         Self {
             points,
             colors,
             grid,
             sigma,
+            settings: *settings,
         }
     }
 
@@ -100,9 +88,9 @@ impl ScanPaint {
     /// Points that can colour a triangle, each once.
     fn near(&self, corners: &[P3; 3]) -> Vec<u32> {
         let mut near = Vec::new();
-        let reach = radius(corners) + REACH * self.sigma;
-        self.grid
-            .within(&middle(corners), reach, |i, _| near.push(i));
+        let reach = radius(corners) + self.settings.reach * self.sigma;
+        let middle = middle(corners);
+        self.grid.within(&middle, reach, |i, _| near.push(i));
         near.sort_unstable();
         near.dedup();
         near
@@ -110,17 +98,23 @@ impl ScanPaint {
 
     /// Mean colour about a point of the surface; `None` where no point is near.
     fn color(&self, near: &[u32], at: &P3, fill: [f32; 3]) -> Option<[f32; 3]> {
-        let (mut sum, mut color) = (0.0, fill.map(|c| FILLED * c));
+        let PaintSettings {
+            reach,
+            seen,
+            filled,
+            ..
+        } = self.settings;
+        let (mut sum, mut color) = (0.0, fill.map(|c| filled * c));
         for i in near {
             let d = (self.points[*i as usize] - at).norm() / self.sigma;
-            if d < REACH {
+            if d < reach {
                 let w = (-0.5 * d * d).exp();
                 sum += w;
                 let own = self.colors[*i as usize];
                 color = std::array::from_fn(|k| color[k] + w * own[k]);
             }
         }
-        (sum > SEEN).then(|| color.map(|c| c / (sum + FILLED)))
+        (sum > seen).then(|| color.map(|c| c / (sum + filled)))
     }
 }
 
@@ -132,12 +126,8 @@ fn colors(scan: &BodyScan) -> impl Iterator<Item = TextureColor> {
         point,
         color: *color,
     });
-    let count = if scan.texture.is_empty() {
-        usize::MAX
-    } else {
-        0
-    };
-    scan.texture.iter().copied().chain(of_points.take(count))
+    let of_points = of_points.filter(|_| scan.texture.is_empty());
+    scan.texture.iter().copied().chain(of_points)
 }
 
 fn middle(corners: &[P3; 3]) -> P3 {
@@ -147,8 +137,6 @@ fn middle(corners: &[P3; 3]) -> P3 {
 /// Largest distance of a corner from the middle, metres.
 fn radius(corners: &[P3; 3]) -> f32 {
     let middle = middle(corners);
-    corners
-        .iter()
-        .map(|p| (p - middle).norm())
-        .fold(0.0, f32::max)
+    let far = corners.iter().map(|p| (p - middle).norm());
+    far.fold(0.0, f32::max)
 }

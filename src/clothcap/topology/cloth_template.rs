@@ -1,8 +1,9 @@
 //! Template of a clothed person: the body's surface, or one whose legs are joined in a tube.
 
-use super::meridian::{Crotch, leg_vertices, meridians};
+use super::meridian::{Crotch, MeridianSearch, leg_vertices};
 use super::strip::{Between, Strip};
 use crate::CaptureError;
+use crate::settings::TopologySettings;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
 use std::sync::Arc;
@@ -10,11 +11,6 @@ use tryon_body::parts::BodySide;
 use tryon_body::{BodyError, ShapeSpace, SkinWeights, Template};
 use tryon_geometry::math::{P3, V3};
 use tryon_geometry::mesh::{Face, TriMesh, sides, undirected};
-
-/// Edges across the tube, metres.
-const SPACING: f32 = 0.02;
-/// Height below the crotch of the faces between the legs that the removal starts at, metres.
-const INNER: f32 = 0.15;
 
 /// Course of the cloth around the legs.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -42,15 +38,15 @@ impl ClothTemplate {
     /// # Errors
     /// [`CaptureError::Topology`] for a body without legs that can be joined.
     pub fn new(body: &Arc<Template>, legs: LegTopology) -> Result<Self, CaptureError> {
-        match legs {
-            LegTopology::Apart => Ok(Self {
-                body: body.clone(),
-                template: body.clone(),
-                legs,
-                between: Vec::new(),
-            }),
-            LegTopology::Joined => join_legs(body),
+        if legs == LegTopology::Joined {
+            return join_legs(body);
         }
+        Ok(Self {
+            body: body.clone(),
+            template: body.clone(),
+            legs,
+            between: Vec::new(),
+        })
     }
 
     /// Body that it clothes.
@@ -74,10 +70,7 @@ impl ClothTemplate {
 
     /// Vertices over those of the body, which come first; any positions or displacements.
     pub fn extend(&self, body: &[P3]) -> Vec<P3> {
-        let between = self.between.iter().map(|b| {
-            let [p, q] = b.ends.map(|v| body[v as usize]);
-            p + (q - p) * b.share
-        });
+        let between = self.between.iter().map(|b| b.at(body));
         body.iter().copied().chain(between).collect()
     }
 
@@ -88,36 +81,40 @@ impl ClothTemplate {
 
     /// Body vertex of a vertex: itself, or the nearer end for one between the legs.
     pub fn body_vertex(&self, vertex: u32) -> u32 {
-        match (vertex as usize).checked_sub(self.body_vertices()) {
-            Some(k) => {
-                let between = &self.between[k];
-                between.ends[usize::from(between.share > 0.5)]
-            }
-            None => vertex,
-        }
+        let k = (vertex as usize).checked_sub(self.body_vertices());
+        k.map_or(vertex, |k| {
+            let between = &self.between[k];
+            between.ends[usize::from(between.share > 0.5)]
+        })
     }
 
-    /// Vertices of the tube that lie near the middle between the legs, top to bottom.
-    pub fn middle(&self) -> impl Iterator<Item = usize> + '_ {
-        /// Shares of the way from leg to leg.
-        const MIDDLE: std::ops::Range<f32> = 0.3..0.7;
-        let inner = self.between.iter().enumerate();
-        inner
-            .filter(|(_, b)| MIDDLE.contains(&b.share))
-            .map(|(k, _)| self.body_vertices() + k)
+    /// Vertices of the tube within a range of shares of the way from leg to leg, top to bottom.
+    pub fn middle(&self, [least, most]: [f32; 2]) -> impl Iterator<Item = usize> + '_ {
+        let inner = (self.body_vertices()..).zip(&self.between);
+        let inner = inner.filter(move |(_, b)| (least..most).contains(&b.share));
+        inner.map(|(v, _)| v)
     }
 }
 
 /// Leaves out the faces between the legs and joins the legs at front and back.
 fn join_legs(body: &Arc<Template>) -> Result<ClothTemplate, CaptureError> {
     let fault = |why: &str| CaptureError::Topology { why: why.into() };
+    let settings = &TopologySettings::default();
     let vertices = body.mesh().vertices();
-    let crotch = Crotch::of(body).ok_or_else(|| fault("the body has no legs"))?;
-    let lines = [1.0, -1.0].map(|face| meridians(body, &crotch, face));
+    let crotch = Crotch::of(body, settings).ok_or_else(|| fault("the body has no legs"))?;
+    let lines = [1.0, -1.0].map(|face| {
+        let search = MeridianSearch {
+            template: body,
+            crotch: &crotch,
+            face,
+            settings,
+        };
+        search.run()
+    });
     let [Some(mut front), Some(mut back)] = lines else {
         return Err(fault("no line of edges leads down its legs"));
     };
-    let gone = inner_faces(body, &crotch, &[&front, &back]);
+    let gone = inner_faces(body, &crotch, &[&front, &back], settings);
     let lines = front.iter_mut().chain(&mut back);
     lines.for_each(|line| keep_open(body, &gone, line));
     let all = body.mesh().faces().iter().zip(&gone);
@@ -127,19 +124,9 @@ fn join_legs(body: &Arc<Template>) -> Result<ClothTemplate, CaptureError> {
         let first = (vertices.len() + between.len()) as u32;
         let [left, right] = lines;
         // Lines know nothing of vertices between others: these are numbered behind them.
-        let strip = Strip::join(
-            [left, right],
-            vertices,
-            (vertices.len() as u32, SPACING, outward),
-        );
-        let shift = first - vertices.len() as u32;
-        let renumber = |v: u32| {
-            if v as usize >= vertices.len() {
-                v + shift
-            } else {
-                v
-            }
-        };
+        let strip = Strip::join([left, right], vertices, settings.spacing, outward);
+        let body = vertices.len() as u32;
+        let renumber = |v: u32| if v < body { v } else { v - body + first };
         faces.extend(strip.faces.iter().map(|f| f.map(renumber)));
         between.extend(strip.vertices);
     }
@@ -165,32 +152,32 @@ fn keep_open(body: &Template, gone: &[bool], line: &mut Vec<u32>) {
 }
 
 /// Membership of each face of a body in the region between its legs, which the lines enclose.
-fn inner_faces(body: &Template, crotch: &Crotch, lines: &[&[Vec<u32>; 2]]) -> Vec<bool> {
+fn inner_faces(
+    body: &Template,
+    crotch: &Crotch,
+    lines: &[&[Vec<u32>; 2]],
+    settings: &TopologySettings,
+) -> Vec<bool> {
+    let spacing = settings.spacing;
     let (vertices, faces) = (body.mesh().vertices(), body.mesh().faces());
-    let walls: BTreeSet<[u32; 2]> = lines
-        .iter()
-        .flat_map(|sides| sides.iter().flat_map(|line| line.windows(2)))
-        .map(|e| undirected([e[0], e[1]]))
-        .collect();
+    let walls = lines.iter().copied().flatten();
+    let walls = walls.flat_map(|line| line.windows(2));
+    let walls: BTreeSet<_> = walls.map(|e| undirected([e[0], e[1]])).collect();
     // The lines end a little above or below their height.
-    let lowest = crotch.end + SPACING;
+    let lowest = crotch.end + spacing;
     let is_above = |f: &Face| f.iter().all(|v| vertices[*v as usize].y > lowest);
     let inner = |side| {
         let leg = leg_vertices(body, side);
-        let near = |v: &u32| (vertices[*v as usize].y - crotch.at.y + INNER).abs() < SPACING;
+        let near =
+            |v: &u32| (vertices[*v as usize].y - crotch.at.y + settings.inner).abs() < spacing;
         let off = |v: &u32| vertices[*v as usize].x.abs();
-        leg.into_iter()
-            .filter(near)
-            .min_by(|a, b| off(a).total_cmp(&off(b)))
+        let near = leg.into_iter().filter(near);
+        near.min_by(|a, b| off(a).total_cmp(&off(b)))
     };
     let around = body.topology().vertex_faces();
     let seeds = [BodySide::Left, BodySide::Right].map(inner);
-    let mut open: Vec<u32> = seeds
-        .iter()
-        .flatten()
-        .flat_map(|v| around.row(*v as usize))
-        .copied()
-        .collect();
+    let open = seeds.iter().flatten().flat_map(|v| around.row(*v as usize));
+    let mut open: Vec<u32> = open.copied().collect();
     let mut gone = vec![false; faces.len()];
     while let Some(f) = open.pop() {
         if gone[f as usize] || !is_above(&faces[f as usize]) {
@@ -210,13 +197,9 @@ fn inner_faces(body: &Template, crotch: &Crotch, lines: &[&[Vec<u32>; 2]]) -> Ve
 
 /// Template with further vertices between those of the body and other faces.
 fn extended(body: &Template, between: &[Between], faces: Vec<Face>) -> Result<Template, String> {
-    let at = |all: &[V3], b: &Between| {
-        let [p, q] = b.ends.map(|v| all[v as usize]);
-        p + (q - p) * b.share
-    };
     let coords: Vec<V3> = body.mesh().vertices().iter().map(|p| p.coords).collect();
     let with = |all: &[V3]| -> Vec<V3> {
-        let new = between.iter().map(|b| at(all, b));
+        let new = between.iter().map(|b| b.at(all));
         all.iter().copied().chain(new).collect()
     };
     let mesh = TriMesh::new(with(&coords).into_iter().map(P3::from).collect(), faces);
@@ -244,14 +227,11 @@ fn extended(body: &Template, between: &[Between], faces: Vec<Face>) -> Result<Te
     let fault = |e: BodyError| e.to_string();
     let made = Template::new(body.name(), mesh, body.skeleton().clone(), weights, shape);
     let made = made.map_err(fault)?;
-    match body.pose_shapes() {
-        Some(shapes) => {
-            let between = between.iter().map(|b| (b.ends, b.share));
-            let shapes = shapes.extended(between);
-            made.with_pose_shapes(shapes).map_err(fault)
-        }
-        None => Ok(made),
-    }
+    let Some(shapes) = body.pose_shapes() else {
+        return Ok(made);
+    };
+    let shapes = shapes.extended(between.iter().map(|b| (b.ends, b.share)));
+    made.with_pose_shapes(shapes).map_err(fault)
 }
 
 #[cfg(test)]
@@ -264,7 +244,8 @@ mod tests {
         let body = embedded::template();
         let cloth = ClothTemplate::new(&body, LegTopology::Joined).expect("the body has legs");
         let vertices = cloth.template().mesh().vertices();
-        let crotch = Crotch::of(&body).expect("legs").at.y;
+        let crotch = Crotch::of(&body, &TopologySettings::default());
+        let crotch = crotch.expect("legs").at.y;
         // A horizontal cut between crotch and knee meets faces in front and behind at the middle, and none between.
         let level = crotch - 0.2;
         let mut depths: Vec<f32> = Vec::new();
@@ -277,20 +258,16 @@ mod tests {
                 depths.push(p.iter().map(|q| q.z).sum::<f32>() / 3.0);
             }
         }
-        let spread = depths.iter().copied().fold(f32::MIN, f32::max)
-            - depths.iter().copied().fold(f32::MAX, f32::min);
-        assert!(!depths.is_empty() && spread > 0.1, "{depths:?}");
+        depths.sort_by(f32::total_cmp);
+        let spread = depths[depths.len() - 1] - depths[0];
+        assert!(spread > 0.1, "{depths:?}");
         let count = |t: &Template| t.mesh().faces().len() as f64;
         let kept = count(cloth.template()) / count(&body);
         assert!((0.8..1.1).contains(&kept), "{kept}");
         // It lies on its body.
         let extended = cloth.extend(body.mesh().vertices());
-        let worst = extended
-            .iter()
-            .zip(vertices)
-            .map(|(a, b)| (a - b).norm())
-            .fold(0.0, f32::max);
-        assert!(worst < 1e-6, "{worst}");
-        assert!(cloth.middle().count() > 20);
+        let off = extended.iter().zip(vertices).map(|(a, b)| (a - b).norm());
+        assert!(off.fold(0.0, f32::max) < 1e-6);
+        assert!(cloth.middle([0.3, 0.7]).count() > 20);
     }
 }

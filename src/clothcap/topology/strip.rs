@@ -1,6 +1,7 @@
 //! Strip of triangles between two lines of vertices.
 
-use tryon_geometry::math::P3;
+use std::ops::{Add, Sub};
+use tryon_geometry::math::{P3, V3};
 use tryon_geometry::mesh::{Face, face_normal};
 
 /// Vertex between two others: share 0 is the first, 1 the second.
@@ -10,6 +11,17 @@ pub(super) struct Between {
     pub(super) ends: [u32; 2],
     /// Share of the second one.
     pub(super) share: f32,
+}
+
+impl Between {
+    /// Its value between those of its ends.
+    pub(super) fn at<T>(&self, all: &[T]) -> T
+    where
+        T: Copy + Sub<T, Output = V3> + Add<V3, Output = T>,
+    {
+        let [p, q] = self.ends.map(|v| all[v as usize]);
+        p + (q - p) * self.share
+    }
 }
 
 /// New vertices, numbered from the body's count on, and faces.
@@ -22,15 +34,17 @@ pub(super) struct Strip {
 }
 
 impl Strip {
-    /// Joins two lines that begin at one vertex with triangles of edges near `spacing`, metres. New vertices are numbered
-    /// from `first` on; faces look along `outward` (±z).
+    /// Joins two lines that begin at one vertex of a body with triangles of edges near `spacing`, metres. New vertices are
+    /// numbered after the body's; faces point along `outward` (±z).
     pub(super) fn join(
         [left, right]: [&[u32]; 2],
         body: &[P3],
-        (first, spacing, outward): (u32, f32, f32),
+        spacing: f32,
+        outward: f32,
     ) -> Self {
+        let first = body.len() as u32;
         let mut out = Self::default();
-        let mut rows = pairs(left, right, body).into_iter().map(|ends| {
+        let rows = pairs(left, right, body).into_iter().map(|ends| {
             let [a, b] = ends.map(|v| body[v as usize]);
             let inner = ((a - b).norm() / spacing).round() as usize;
             let mut row = vec![ends[0]];
@@ -46,13 +60,9 @@ impl Strip {
             }
             row
         });
-        let rows: Vec<Vec<u32>> = rows.by_ref().collect();
+        let rows: Vec<Vec<u32>> = rows.collect();
         let at = |v: u32| match v.checked_sub(first) {
-            Some(k) => {
-                let between = &out.vertices[k as usize];
-                let [a, b] = between.ends.map(|v| body[v as usize]);
-                a + (b - a) * between.share
-            }
+            Some(k) => out.vertices[k as usize].at(body),
             None => body[v as usize],
         };
         for pair in rows.windows(2) {
@@ -136,17 +146,11 @@ mod tests {
         let body: Vec<P3> = left.iter().chain(&right[1..]).copied().collect();
         let l: Vec<u32> = (0..8).collect();
         let r: Vec<u32> = std::iter::once(0).chain(8..19).collect();
-        let strip = Strip::join([&l, &r], &body, (19, 0.1, 1.0));
+        let strip = Strip::join([&l, &r], &body, 0.1, 1.0);
         let mut all = body.clone();
-        all.extend(strip.vertices.iter().map(|b| {
-            let [p, q] = b.ends.map(|v| body[v as usize]);
-            p + (q - p) * b.share
-        }));
-        let area: f32 = strip
-            .faces
-            .iter()
-            .map(|f| face_normal(&all, f).z / 2.0)
-            .sum();
+        all.extend(strip.vertices.iter().map(|b| b.at(&body)));
+        let areas = strip.faces.iter().map(|f| face_normal(&all, f).z / 2.0);
+        let area: f32 = areas.sum();
         assert!((area - 0.5).abs() < 1e-5, "{area}");
         let mesh = tryon_geometry::mesh::TriMesh::new(all, strip.faces).expect("faces in range");
         let topology = tryon_geometry::mesh::Topology::new(&mesh).expect("manifold");

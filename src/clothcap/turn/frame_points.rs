@@ -1,28 +1,12 @@
 //! Points of one frame on the tracked subject, with normals from local planes of the depth image.
 
 use crate::scan::BodyScan;
+use crate::settings::FramePointSettings;
 use nalgebra::{Matrix3, Vector3};
 use tryon_geometry::camera::{Calibration, ColorImage, DepthImage, Intrinsics, RgbdFrame};
 use tryon_geometry::math::{Camera, P3, Rigid, V3, World};
 use tryon_geometry::par::{self, Par};
 use tryon_geometry::spatial::PointTree;
-
-/// Distance from the tracked body within which a reading is the subject for certain, metres.
-const CERTAIN: f32 = 0.05;
-/// Farthest that cloth and hair stand off the tracked body, metres.
-const FARTHEST: f32 = 0.16;
-/// Height over a known floor below which readings are floor, metres.
-const FLOOR: f32 = 0.025;
-/// Largest step of depth between neighbouring pixels of one surface, as a share of the depth.
-const STEP: f32 = 0.02;
-/// Half the side of the window of a local plane, pixels: at 2 m, 11 mm to either side.
-const WINDOW: i32 = 3;
-/// Least readings of a local plane.
-const LEAST: usize = 20;
-/// Pixels beside a step of depth that are left out: sensors mix both surfaces there.
-const RIM: i32 = 2;
-/// Least cosine between normal and ray: at 75° a pixel of error is 15 mm of depth.
-const GRAZING: f32 = 0.26;
 
 /// Points of a frame on the subject whose tracked body is `posed`; camera frame, metres. Readings near the floor are left
 /// out where it is known.
@@ -31,10 +15,12 @@ pub(super) fn camera_points(
     calibration: &Calibration,
     posed: &[P3],
     floor: Option<&Rigid<World, Camera>>,
+    settings: &FramePointSettings,
 ) -> BodyScan {
     let image = DepthReader {
         depth: &frame.depth,
         camera: &calibration.depth,
+        settings,
     };
     let mask = image.subject(posed, floor);
     let pixels: Vec<usize> = (0..mask.len()).filter(|i| mask[*i]).collect();
@@ -75,6 +61,7 @@ fn color_at(image: &ColorImage, calibration: &Calibration, point: &P3) -> [u8; 3
 struct DepthReader<'a> {
     depth: &'a DepthImage,
     camera: &'a Intrinsics,
+    settings: &'a FramePointSettings,
 }
 
 impl DepthReader<'_> {
@@ -95,10 +82,13 @@ impl DepthReader<'_> {
 
     /// Pixels of the subject: connected to readings on the tracked body, off it by less than cloth stands off.
     fn subject(&self, posed: &[P3], floor: Option<&Rigid<World, Camera>>) -> Vec<bool> {
+        let settings = self.settings;
         let tree = PointTree::new(posed);
         let up = floor.map(|w| (w.inverse().vector(&Vector3::y()).cast::<f32>(), w));
         let above = |p: &P3| match &up {
-            Some((up, w)) => up.dot(&p.coords) + w.iso().translation.vector.y as f32 > FLOOR,
+            Some((up, w)) => {
+                up.dot(&p.coords) + w.iso().translation.vector.y as f32 > settings.floor
+            }
             None => true,
         };
         let mut off = Vec::new();
@@ -107,10 +97,10 @@ impl DepthReader<'_> {
             if p.z <= 0.0 || !above(&p) {
                 return f32::INFINITY;
             }
-            tree.nearest(&p, FARTHEST)
-                .map_or(f32::INFINITY, |(_, d2)| d2.sqrt())
+            let nearest = tree.nearest(&p, settings.farthest);
+            nearest.map_or(f32::INFINITY, |(_, d2)| d2.sqrt())
         });
-        let mut mask: Vec<bool> = off.iter().map(|d| *d < CERTAIN).collect();
+        let mut mask: Vec<bool> = off.iter().map(|d| *d < settings.certain).collect();
         let mut open: Vec<usize> = (0..mask.len()).filter(|i| mask[*i]).collect();
         let width = self.depth.width() as i32;
         while let Some(i) = open.pop() {
@@ -118,7 +108,7 @@ impl DepthReader<'_> {
             for (du, dv) in [(1, 0), (-1, 0), (0, 1), (0, -1)] {
                 let (a, b) = (self.z(u, v), self.z(u + du, v + dv));
                 let j = ((v + dv) * width + u + du) as usize;
-                if b > 0.0 && !mask[j] && off[j].is_finite() && (a - b).abs() < STEP * a {
+                if b > 0.0 && !mask[j] && off[j].is_finite() && (a - b).abs() < settings.step * a {
                     mask[j] = true;
                     open.push(j);
                 }
@@ -129,16 +119,18 @@ impl DepthReader<'_> {
 
     /// Point and unit normal of the plane through the readings about a pixel; `None` at rims and grazing angles.
     fn local_plane(&self, i: usize, mask: &[bool]) -> Option<(P3, V3)> {
+        let settings = self.settings;
+        let (window, rim) = (settings.window, settings.rim);
         let (u, v) = self.at(i);
         let z = self.z(u, v);
         let width = self.depth.width() as i32;
         let (mut h, mut g) = (Matrix3::<f32>::zeros(), Vector3::<f32>::zeros());
         let mut count = 0;
-        for dv in -WINDOW..=WINDOW {
-            for du in -WINDOW..=WINDOW {
+        for dv in -window..=window {
+            for du in -window..=window {
                 let other = self.z(u + du, v + dv);
-                let is_near = du.abs() <= RIM && dv.abs() <= RIM;
-                if other <= 0.0 || (other - z).abs() > 2.0 * STEP * z {
+                let is_near = du.abs() <= rim && dv.abs() <= rim;
+                if other <= 0.0 || (other - z).abs() > 2.0 * settings.step * z {
                     if is_near {
                         return None;
                     }
@@ -154,7 +146,7 @@ impl DepthReader<'_> {
                 count += 1;
             }
         }
-        if count < LEAST {
+        if count < settings.least {
             return None;
         }
         let [a, b, c] = h.cholesky()?.solve(&g).into();
@@ -166,6 +158,6 @@ impl DepthReader<'_> {
         let point = camera.unproject(u as f32, v as f32, 1.0 / a);
         let normal = -plane.try_normalize(f32::MIN_POSITIVE)?;
         let cosine = -normal.dot(&point.coords.normalize());
-        (a > 0.0 && cosine > GRAZING).then_some((point, normal))
+        (a > 0.0 && cosine > settings.grazing).then_some((point, normal))
     }
 }

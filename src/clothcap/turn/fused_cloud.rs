@@ -1,7 +1,9 @@
 //! Points of many poses in one: each point moves with the surface that it lies on.
 
 use super::moving_parts::MovingParts;
+use crate::align::PosedBody;
 use crate::scan::BodyScan;
+use crate::settings::FusedCloudSettings;
 use nalgebra::{Isometry3, Matrix4, Vector3};
 use std::collections::BTreeMap;
 use tryon_body::{BoneTransforms, PosedSkin, SkinWeights, Template};
@@ -9,13 +11,6 @@ use tryon_geometry::math::{P3, V3};
 use tryon_geometry::mesh::Face;
 use tryon_geometry::par::{self, Par};
 use tryon_geometry::spatial::Bvh;
-
-/// Farthest that a point of the subject lies off the surface, metres.
-const FARTHEST: f32 = 0.06;
-/// Smallest cosine between the normals of point and surface.
-const NORMALS: f32 = 0.3;
-/// Weight above which a point of several frames is kept: two grazing readings or half a frontal one.
-const LEAST_WEIGHT: f32 = 0.3;
 
 /// Point in the pose of the reference.
 #[derive(Clone, Copy, Debug)]
@@ -55,10 +50,11 @@ impl FusedPoint {
 fn largest_parts(
     weights: &SkinWeights,
     parts: &MovingParts,
-    at: (&Face, [f32; 3]),
+    face: &Face,
+    corners: [f32; 3],
 ) -> ([usize; 2], f32) {
     let mut shares: BTreeMap<usize, f32> = BTreeMap::new();
-    for (v, corner) in at.0.iter().zip(at.1) {
+    for (v, corner) in face.iter().zip(corners) {
         let v = *v as usize;
         for (bone, w) in weights.joints[v].iter().zip(weights.weights[v]) {
             *shares.entry(parts.of(usize::from(*bone))).or_default() += w * corner;
@@ -74,51 +70,51 @@ fn largest_parts(
     )
 }
 
-/// Pose in which points were seen, or to which they go.
-pub(super) struct PosedSurface<'a> {
-    /// Vertices, world, metres, shape `[vertices]`.
-    pub(super) vertices: &'a [P3],
+/// Pose to which the points of all frames are taken.
+pub(super) struct Reference<'a> {
+    pub(super) template: &'a Template,
+    pub(super) parts: &'a MovingParts,
     pub(super) bones: &'a BoneTransforms,
+    /// Place of the camera, world, metres.
+    pub(super) eye: P3,
+    pub(super) settings: &'a FusedCloudSettings,
 }
 
-/// Takes points from one pose to another; `eye` is where they were seen from, world, metres.
-pub(super) fn reposed(
-    (template, parts): (&Template, &MovingParts),
-    (points, eye): (&BodyScan, &P3),
-    from: &PosedSurface<'_>,
-    to: &BoneTransforms,
-) -> Vec<FusedPoint> {
-    let bvh = Bvh::new(template.mesh().faces(), from.vertices);
-    let weights = template.weights();
-    let skins = [from.bones, to].map(|bones| PosedSkin::blended(weights, bones));
-    let mut out = Vec::new();
-    par::map_into(Par::Rayon, points.points.len(), 256, &mut out, |i| {
-        let (p, n) = (&points.points[i], points.normals[i]);
-        let found = bvh.closest(from.vertices, p)?;
-        let own = bvh.unit_normal(from.vertices, found.face)?;
-        if found.distance > FARTHEST || !points.normal(i).agrees(&own, NORMALS) {
-            return None;
-        }
-        let face = bvh.faces()[found.face as usize];
-        let blend = |skin: &PosedSkin<'_>| -> Matrix4<f64> {
-            let corners = face.iter().zip(found.weights);
-            corners
-                .map(|(v, w)| skin.transform(*v as usize) * f64::from(w))
-                .sum()
-        };
-        let motion = blend(&skins[1]) * PosedSkin::inverse(&blend(&skins[0]))?;
-        let (parts, share) = largest_parts(weights, parts, (&face, found.weights));
-        let cosine = n.dot(&(eye - p).normalize());
-        Some(FusedPoint {
-            point: motion.transform_point(&p.cast()).cast(),
-            normal: motion.transform_vector(&n.cast()).cast::<f32>().normalize(),
-            color: points.colors.get(i).copied(),
-            weight: cosine * cosine,
-            parts,
-            share,
-        })
-    });
-    out.into_iter().flatten().collect()
+impl Reference<'_> {
+    /// Takes points, world, metres, from the pose in which they were seen.
+    pub(super) fn reposed(&self, points: &BodyScan, from: &PosedBody) -> Vec<FusedPoint> {
+        let bvh = Bvh::new(self.template.mesh().faces(), &from.vertices);
+        let weights = self.template.weights();
+        let skins = [&from.bones, self.bones].map(|bones| PosedSkin::blended(weights, bones));
+        let mut out = Vec::new();
+        par::map_into(Par::Rayon, points.points.len(), 256, &mut out, |i| {
+            let (p, n) = (&points.points[i], points.normals[i]);
+            let found = bvh.closest(&from.vertices, p)?;
+            let own = bvh.unit_normal(&from.vertices, found.face)?;
+            let is_far = found.distance > self.settings.farthest;
+            if is_far || !points.agrees(i, &own, self.settings.normals) {
+                return None;
+            }
+            let face = bvh.faces()[found.face as usize];
+            let blend = |skin: &PosedSkin<'_>| -> Matrix4<f64> {
+                let corners = face.iter().zip(found.weights);
+                let blend = |(v, w): (&u32, f32)| skin.transform(*v as usize) * f64::from(w);
+                corners.map(blend).sum()
+            };
+            let motion = blend(&skins[1]) * PosedSkin::inverse(&blend(&skins[0]))?;
+            let (parts, share) = largest_parts(weights, self.parts, &face, found.weights);
+            let cosine = n.dot(&(self.eye - p).normalize());
+            Some(FusedPoint {
+                point: motion.transform_point(&p.cast()).cast(),
+                normal: motion.transform_vector(&n.cast()).cast::<f32>().normalize(),
+                color: points.colors.get(i).copied(),
+                weight: cosine * cosine,
+                parts,
+                share,
+            })
+        });
+        out.into_iter().flatten().collect()
+    }
 }
 
 /// Sums over the points of one cell that face one way.
@@ -133,11 +129,11 @@ struct CellSum {
 }
 
 /// Mean of the points in each cell of `cell` metres, apart by the octant of their normals, as a scan. Colours are those of the
-/// most frontal reading: means would blur prints and hems. Of several frames, cells with few readings are left out.
+/// most frontal reading: means would blur prints and hems. Cells of no more than the least weight are left out.
 pub(super) fn merged<'a>(
     points: impl Iterator<Item = &'a FusedPoint>,
     cell: f32,
-    frames: usize,
+    least: f32,
 ) -> BodyScan {
     let mut cells: BTreeMap<[i32; 4], CellSum> = BTreeMap::new();
     for p in points {
@@ -156,7 +152,6 @@ pub(super) fn merged<'a>(
         ..BodyScan::default()
     };
     let is_colored = cells.values().all(|s| s.color.is_some());
-    let least = if frames > 1 { LEAST_WEIGHT } else { 0.0 };
     for sum in cells.values().filter(|s| s.weight > least) {
         let Some(normal) = sum.normal.try_normalize(f32::MIN_POSITIVE) else {
             continue;

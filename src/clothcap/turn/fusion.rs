@@ -1,38 +1,18 @@
 //! Fusion of key frames: all points in the pose of one frame, registered to each other, merged to one scan.
 
-use super::fused_cloud::{PosedSurface, merged, reposed};
+use super::fused_cloud::{Reference, merged};
 use super::key_frames::{KeyFrame, KeyFrames, moved};
 use super::moving_parts::MovingParts;
-use super::multi_view::{self, RegisteredFrame, measure, register};
+use super::multi_view::{RegisteredFrame, measure, register};
 use super::{KeyFrameReport, TurnError, TurnReport};
-use crate::align::{AlignedBody, FreeSurface, ModelFit, Start, SurfaceFitConfig};
+use crate::align::{AlignedBody, FreeSurface, ModelFit, PosedBody, Start};
 use crate::scan::BodyScan;
 use crate::segment::{BodyRegion, unseen_regions};
+use crate::settings::{AlignmentSettings, FreeSurfaceSettings, LabelSettings, TurnConfig};
 use std::sync::Arc;
 use tryon_body::{BodyShape, BoneTransforms, Pose, Template, skin};
 use tryon_geometry::math::{Camera, P3, P3d, Rigid, World};
 use tryon_geometry::par::Par;
-
-/// Points in the comparison of scan and body.
-const SAMPLES: usize = 1500;
-
-/// Settings of a fusion.
-#[derive(Clone, Debug, PartialEq)]
-pub struct TurnConfig {
-    /// Iterations of the registration; 0 fuses the tracked poses as they are.
-    pub iterations: usize,
-    /// Side of a cell whose points are one in the scan, metres.
-    pub cell: f32,
-}
-
-impl Default for TurnConfig {
-    fn default() -> Self {
-        Self {
-            iterations: multi_view::iterations(),
-            cell: 0.006,
-        }
-    }
-}
 
 /// Scan of a subject fused from the frames of one camera.
 #[derive(Clone, Debug)]
@@ -60,27 +40,33 @@ pub fn fuse(
     let frontal = frontal.min_by(|a, b| a.1.yaw.abs().total_cmp(&b.1.yaw.abs()));
     let reference = frontal.map_or(0, |(k, _)| k);
     let parts = MovingParts::new(template);
-    let mut frames = posed_as(template, keys, reference, &parts);
-    measure(&mut frames);
+    let mut frames = posed_as(template, keys, reference, &parts, config);
+    measure(&mut frames, &config.views);
     let tracked: Vec<f64> = frames.iter().map(|f| f.error).collect();
-    register(&mut frames, &parts, reference, config.iterations)?;
+    register(&mut frames, &parts, reference, config)?;
 
     let points = frames.iter().flat_map(|f| &f.points);
-    let scan = merged(points, config.cell, frames.len()).checked()?;
+    let is_single = frames.len() < 2;
+    let least = if is_single {
+        0.0
+    } else {
+        config.cloud.least_weight
+    };
+    let scan = merged(points, config.cell, least).checked()?;
     let body = body_of(keys, &keys.frames[reference]);
-    let mut fit = ModelFit::new(template, &scan, SAMPLES);
-    let error = fit.error(&body);
-    let (model, _) = fit.posed(&body);
+    let align = AlignmentSettings::default();
+    let error = ModelFit::new(template, &scan, config.samples, &align.model).error(&body);
+    let model = body.posed(template).vertices;
     let mut report = TurnReport {
         frames: keys.count,
         live: keys.live,
         used: key_reports(keys, &frames, &tracked),
         reference: keys.frames[reference].frame,
         points: scan.points.len(),
-        unseen: unseen(template, &scan, model)?,
+        unseen: unseen(template, &scan, model, align.surface)?,
         ..TurnReport::default()
     };
-    report.measure_coverage();
+    report.measure_coverage(config.whole_turn_gap);
     Ok(FusedTurn {
         start: Start {
             error,
@@ -106,12 +92,8 @@ fn key_reports(
         tracked_error: *tracked,
         registered_error: frame.error,
     };
-    keys.frames
-        .iter()
-        .zip(frames)
-        .zip(tracked)
-        .map(one)
-        .collect()
+    let all = keys.frames.iter().zip(frames).zip(tracked);
+    all.map(one).collect()
 }
 
 /// Tracked body of a frame in the world, without displacements.
@@ -134,9 +116,9 @@ fn posed_as(
     keys: &KeyFrames,
     reference: usize,
     parts: &MovingParts,
+    config: &TurnConfig,
 ) -> Vec<RegisteredFrame> {
     let world = &keys.world_from_camera;
-    let eye: P3 = world.point(&P3d::origin()).cast();
     let rest = template.personalise(&keys.shape);
     let bones_of = |key: &KeyFrame| {
         let mut bones = BoneTransforms::default();
@@ -144,24 +126,22 @@ fn posed_as(
         pose.bones(template.skeleton(), &rest, &mut bones);
         bones
     };
-    let to = bones_of(&keys.frames[reference]);
+    let to = Reference {
+        template,
+        parts,
+        bones: &bones_of(&keys.frames[reference]),
+        eye: world.point(&P3d::origin()).cast(),
+        settings: &config.cloud,
+    };
     let one = |key: &KeyFrame| {
-        let bones = bones_of(key);
-        let mut vertices = Vec::new();
-        skin(
-            Par::Rayon,
-            &rest.vertices,
-            template.weights(),
-            &bones,
-            &mut vertices,
-        );
-        let from = PosedSurface {
-            vertices: &vertices,
-            bones: &bones,
+        let mut from = PosedBody {
+            bones: bones_of(key),
+            ..PosedBody::default()
         };
-        let points = moved(&key.points, world);
-        let points = reposed((template, parts), (&points, &eye), &from, &to);
-        RegisteredFrame::new(points, key.yaw, (parts, &to.joints))
+        let (weights, vertices) = (template.weights(), &mut from.vertices);
+        skin(Par::Rayon, &rest.vertices, weights, &from.bones, vertices);
+        let points = to.reposed(&moved(&key.points, world), &from);
+        RegisteredFrame::new(points, key.yaw, parts, &to.bones.joints)
     };
     keys.frames.iter().map(one).collect()
 }
@@ -171,9 +151,11 @@ fn unseen(
     template: &Template,
     scan: &BodyScan,
     model: Vec<P3>,
+    settings: FreeSurfaceSettings,
 ) -> Result<Vec<BodyRegion>, TurnError> {
-    let mut free = FreeSurface::new(template)?;
+    let mut free = FreeSurface::new(template, settings)?;
     let mut surface = model.clone();
-    free.run(scan, &model, &mut surface, &SurfaceFitConfig::later())?;
-    Ok(unseen_regions(template, free.matches()))
+    free.run(scan, &model, &mut surface, &settings.later, true)?;
+    let labels = LabelSettings::default();
+    Ok(unseen_regions(template, free.matches(), &labels))
 }

@@ -3,6 +3,7 @@
 use super::TurnError;
 use super::frame_points::camera_points;
 use crate::scan::BodyScan;
+use crate::settings::TurnConfig;
 use std::f64::consts::TAU;
 use std::sync::Arc;
 use tryon_body::{BodyShape, Pose, Template};
@@ -12,13 +13,6 @@ use tryon_tracking::still::StillSteps;
 use tryon_tracking::{
     PartClasses, TrackerConfig, TrackerModel, TrackerState, Workspace, yaw_of_joints,
 };
-
-/// Key frames of a whole turn: one every 15°, so that each place is seen by eight within 60° of its normal.
-const BINS: usize = 24;
-/// Steps on the first frame before the others: the tracker finds the subject in one and measures its size in the next.
-const FIRST_STEPS: u64 = 3;
-/// Time between these steps, nanoseconds.
-const STEP_NS: u64 = 33_000_000;
 
 /// Frame that shows the subject at one yaw.
 #[derive(Clone, Debug)]
@@ -59,6 +53,7 @@ pub struct TurnTracker {
     best: Vec<Option<KeyFrame>>,
     count: usize,
     live: usize,
+    settings: TurnConfig,
 }
 
 impl TurnTracker {
@@ -69,11 +64,13 @@ impl TurnTracker {
             ..TrackerConfig::default()
         };
         let model = TrackerModel::new(template, calibration, config);
+        let settings = TurnConfig::default();
         Self {
             state: TrackerState::new(&model),
             workspace: Workspace::default(),
             classes: PartClasses::new(model.template()),
-            best: vec![None; BINS],
+            best: vec![None; settings.key_frames],
+            settings,
             count: 0,
             live: 0,
             model,
@@ -86,20 +83,20 @@ impl TurnTracker {
     /// [`TurnError::Frame`] for one that does not fit the camera.
     pub fn step(&mut self, frame: &RgbdFrame) -> Result<(), TurnError> {
         let is_first = self.count == 0;
+        let (first_steps, interval_ns) = (self.settings.first_steps, self.settings.interval_ns);
         let steps = StillSteps {
-            count: if is_first { FIRST_STEPS } else { 1 },
-            interval_ns: STEP_NS,
+            count: if is_first { first_steps } else { 1 },
+            interval_ns,
         };
-        let lead = if is_first { 0 } else { FIRST_STEPS - 1 };
+        let lead = if is_first { 0 } else { first_steps - 1 };
         let mut late = frame.clone();
-        late.time_ns = late.time_ns.saturating_add(lead * STEP_NS);
+        late.time_ns = late.time_ns.saturating_add(lead * interval_ns);
         let report = steps.run(&self.model, &mut self.state, &late, &mut self.workspace);
-        let quality = report
-            .map_err(|source| TurnError::Frame {
-                frame: self.count,
-                source,
-            })?
-            .quality;
+        let frame_of = |source| TurnError::Frame {
+            frame: self.count,
+            source,
+        };
+        let quality = report.map_err(frame_of)?.quality;
         if self.state.status.is_live() {
             self.live += 1;
             self.keep(frame, quality);
@@ -111,24 +108,18 @@ impl TurnTracker {
     /// Keeps the frame if it is the best one of its yaw.
     fn keep(&mut self, frame: &RgbdFrame, quality: f64) {
         let (posed, bones) = self.workspace.posed(&self.model, &self.state);
-        let up = self
-            .state
-            .world_from_camera
-            .inverse()
-            .vector(&nalgebra::Vector3::y());
+        let world = &self.state.world_from_camera;
+        let up = world.inverse().vector(&nalgebra::Vector3::y());
         let yaw = yaw_of_joints(&self.classes, &bones.joints, &up.cast::<f32>()).unwrap_or(0.0);
-        let bin = (yaw.rem_euclid(TAU) / TAU * BINS as f64).round() as usize % BINS;
-        if self.best[bin]
-            .as_ref()
-            .is_some_and(|b| b.quality >= quality)
-        {
+        let bins = self.best.len();
+        let bin = (yaw.rem_euclid(TAU) / TAU * bins as f64).round() as usize % bins;
+        let before = self.best[bin].as_ref();
+        if before.is_some_and(|b| b.quality >= quality) {
             return;
         }
-        let floor = self
-            .state
-            .floor_known
-            .then_some(&self.state.world_from_camera);
-        let points = camera_points(frame, self.model.calibration(), posed, floor);
+        let floor = self.state.floor_known.then_some(world);
+        let (calibration, settings) = (self.model.calibration(), &self.settings.points);
+        let points = camera_points(frame, calibration, posed, floor, settings);
         self.best[bin] = Some(KeyFrame {
             frame: self.count,
             yaw,

@@ -15,7 +15,8 @@ mod report;
 #[cfg(test)]
 mod tests;
 
+pub use crate::settings::TurnConfig;
 pub use error::TurnError;
-pub use fusion::{FusedTurn, TurnConfig, fuse};
+pub use fusion::{FusedTurn, fuse};
 pub use key_frames::{KeyFrame, KeyFrames, TurnTracker};
 pub use report::{KeyFrameReport, TurnReport};

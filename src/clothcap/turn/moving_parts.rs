@@ -25,12 +25,8 @@ impl MovingParts {
         ];
         let mut joints = vec![0];
         joints.extend(["spine2", "head"].iter().filter_map(|j| skeleton.index(j)));
-        joints.extend(
-            limbs
-                .iter()
-                .filter_map(|l| template.parts().limb(*l))
-                .map(|l| l.root),
-        );
+        let limbs = limbs.iter().filter_map(|l| template.parts().limb(*l));
+        joints.extend(limbs.map(|l| l.root));
         let mut of_bone = vec![0; skeleton.len()];
         for (bone, joint) in skeleton.joints().iter().enumerate() {
             let own = joints.iter().skip(1).position(|j| *j == bone);

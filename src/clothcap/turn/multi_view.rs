@@ -6,38 +6,15 @@
 use super::fused_cloud::FusedPoint;
 use super::moving_parts::MovingParts;
 use crate::CaptureError;
-use nalgebra::{DMatrix, DVector, Isometry3, Translation3, UnitQuaternion, Vector3, Vector6};
+use crate::dense_equations::DenseEquations;
+use crate::settings::{MultiViewSettings, TurnConfig};
+use nalgebra::{DVector, Isometry3, Translation3, UnitQuaternion, Vector3, Vector6};
 use std::f64::consts::TAU;
 use tryon_geometry::math::{P3, P3d};
 use tryon_geometry::par::{self, Par};
 use tryon_geometry::spatial::PointTree;
 use tryon_tracking::registration::GemanMcClure;
 
-/// Points of a frame that are paired in an iteration.
-const SAMPLES: usize = 900;
-/// Frames whose yaws differ by less see one place, radians.
-const OVERLAP: f64 = 1.1;
-/// Smallest cosine between the normals of a pair.
-const NORMALS: f32 = 0.7;
-/// Longest pair and width of the kernel, metres, from the first to the last iteration.
-const REACH: [f64; 2] = [0.08, 0.02];
-/// See [`REACH`].
-const SIGMA: [f64; 2] = [0.04, 0.01];
-/// Iterations.
-const ITERATIONS: usize = 14;
-/// Standard deviation of a pair, metres, and number of independent ones in a frame: neighbours share noise and cloth.
-const DEVIATION: f64 = 0.01;
-/// See [`DEVIATION`].
-const INDEPENDENT: f64 = 300.0;
-/// Distance that parts may move apart at their joint, metres.
-const JOINT: f64 = 0.03;
-/// Turn of a part against its parent, beyond that of the tracked pose, radians. Legs and head are nearly round: without a
-/// bound they spin.
-const BEND: f64 = 0.5;
-/// Motion of a frame in one iteration, metres and radians.
-const STEP: f64 = 0.1;
-/// The same of the reference: its points stay where they were seen.
-const HELD: f64 = 1e-4;
 /// Unknowns of a part in a frame.
 const DOFS: usize = 6;
 
@@ -59,7 +36,8 @@ impl RegisteredFrame {
     pub(super) fn new(
         points: Vec<FusedPoint>,
         yaw: f64,
-        (parts, joints): (&MovingParts, &[P3d]),
+        parts: &MovingParts,
+        joints: &[P3d],
     ) -> Self {
         Self {
             points,
@@ -81,34 +59,28 @@ struct ViewPair {
 }
 
 /// Moves the points of all frames until they meet; those of `reference` stay.
-///
-/// # Errors
-/// [`CaptureError::Solve`].
 pub(super) fn register(
     frames: &mut [RegisteredFrame],
     parts: &MovingParts,
     reference: usize,
-    iterations: usize,
+    config: &TurnConfig,
 ) -> Result<(), CaptureError> {
-    for k in 0..iterations {
-        let t = k as f64 / (ITERATIONS - 1).max(1) as f64;
-        let between = |[a, b]: [f64; 2]| a * (b / a).powf(t.min(1.0));
-        let pairs = pair(frames, between(REACH), between(SIGMA));
-        let update = solve(frames, parts, reference, &pairs)?;
+    let settings = &config.views;
+    for k in 0..config.iterations {
+        let t = k as f64 / (config.iterations - 1).max(1) as f64;
+        let between = |[a, b]: [f64; 2]| a * (b / a).powf(t);
+        let [reach, sigma] = [settings.reach, settings.sigma].map(between);
+        let pairs = pair(frames, reach, sigma, settings);
+        let update = solve(frames, parts, reference, &pairs, settings)?;
         apply(frames, parts, &update);
     }
-    measure(frames);
+    measure(frames, settings);
     Ok(())
 }
 
-/// Iterations of a whole registration.
-pub(super) const fn iterations() -> usize {
-    ITERATIONS
-}
-
 /// Sets the error of each frame.
-pub(super) fn measure(frames: &mut [RegisteredFrame]) {
-    let pairs = pair(frames, REACH[0], SIGMA[0]);
+pub(super) fn measure(frames: &mut [RegisteredFrame], settings: &MultiViewSettings) {
+    let pairs = pair(frames, settings.reach[0], settings.sigma[0], settings);
     for (k, frame) in frames.iter_mut().enumerate() {
         let own = || pairs.iter().filter(|p| p.frames[0] == k);
         let sum: f64 = own().map(|p| p.distance.abs()).sum();
@@ -116,46 +88,44 @@ pub(super) fn measure(frames: &mut [RegisteredFrame]) {
     }
 }
 
-fn overlap(a: f64, b: f64) -> bool {
-    let d = (a - b).rem_euclid(TAU);
-    d.min(TAU - d) < OVERLAP
-}
-
-fn pair(frames: &[RegisteredFrame], reach: f64, sigma: f64) -> Vec<ViewPair> {
-    let clouds: Vec<Vec<P3>> = frames
-        .iter()
-        .map(|f| f.points.iter().map(|p| p.point).collect())
-        .collect();
+/// Pairs up to a length of `reach`, with a kernel of width `sigma`, metres.
+fn pair(
+    frames: &[RegisteredFrame],
+    reach: f64,
+    sigma: f64,
+    settings: &MultiViewSettings,
+) -> Vec<ViewPair> {
+    let overlap = |a: f64, b: f64| {
+        let d = (a - b).rem_euclid(TAU);
+        d.min(TAU - d) < settings.overlap
+    };
+    let cloud = |f: &RegisteredFrame| f.points.iter().map(|p| p.point).collect();
+    let clouds: Vec<Vec<P3>> = frames.iter().map(cloud).collect();
     let trees: Vec<PointTree> = clouds.iter().map(|c| PointTree::new(c)).collect();
     let kernel = GemanMcClure { sigma };
     let mut out = Vec::new();
     for (a, frame) in frames.iter().enumerate() {
-        let stride = (frame.points.len() / SAMPLES).max(1);
+        let stride = (frame.points.len() / settings.samples).max(1);
         let mut found = Vec::new();
-        par::map_into(
-            Par::Rayon,
-            frame.points.len().div_ceil(stride),
-            32,
-            &mut found,
-            |k| {
-                let i = k * stride;
-                let p = &frame.points[i];
-                let others =
-                    (0..frames.len()).filter(|b| *b != a && overlap(frame.yaw, frames[*b].yaw));
-                let near = others.filter_map(|b| {
-                    let (j, _) = trees[b].nearest(&p.point, reach as f32)?;
-                    let q = &frames[b].points[j];
-                    let distance = f64::from(q.normal.dot(&(p.point - q.point)));
-                    (p.normal.dot(&q.normal) > NORMALS).then(|| ViewPair {
-                        frames: [a, b],
-                        points: [i, j],
-                        weight: kernel.weight(distance * distance) * f64::from(p.weight * q.weight),
-                        distance,
-                    })
-                });
-                near.collect::<Vec<_>>()
-            },
-        );
+        let count = frame.points.len().div_ceil(stride);
+        par::map_into(Par::Rayon, count, 32, &mut found, |k| {
+            let i = k * stride;
+            let p = &frame.points[i];
+            let others =
+                (0..frames.len()).filter(|b| *b != a && overlap(frame.yaw, frames[*b].yaw));
+            let near = others.filter_map(|b| {
+                let (j, _) = trees[b].nearest(&p.point, reach as f32)?;
+                let q = &frames[b].points[j];
+                let distance = f64::from(q.normal.dot(&(p.point - q.point)));
+                (p.normal.dot(&q.normal) > settings.normals).then(|| ViewPair {
+                    frames: [a, b],
+                    points: [i, j],
+                    weight: kernel.weight(distance * distance) * f64::from(p.weight * q.weight),
+                    distance,
+                })
+            });
+            near.collect::<Vec<_>>()
+        });
         out.extend(found.into_iter().flatten());
     }
     out
@@ -167,11 +137,13 @@ fn solve(
     parts: &MovingParts,
     reference: usize,
     pairs: &[ViewPair],
+    settings: &MultiViewSettings,
 ) -> Result<DVector<f64>, CaptureError> {
     let n = frames.len() * parts.len() * DOFS;
-    let (mut h, mut g) = (DMatrix::<f64>::zeros(n, n), DVector::<f64>::zeros(n));
-    let scale =
-        INDEPENDENT * frames.len() as f64 / (pairs.len().max(1) as f64 * DEVIATION * DEVIATION);
+    let mut system = DenseEquations::zeros(n);
+    let deviation = settings.deviation;
+    let scale = settings.independent * frames.len() as f64
+        / (pairs.len().max(1) as f64 * deviation * deviation);
     for p in pairs {
         let q = &frames[p.frames[1]].points[p.points[1]];
         let normal = q.normal.cast::<f64>();
@@ -187,40 +159,30 @@ fn solve(
                 }
             }
         }
-        let weight = scale * p.weight;
-        for (i, a) in &row {
-            g[*i] -= weight * a * p.distance;
-            for (j, b) in &row {
-                h[(*i, *j)] += weight * a * b;
-            }
-        }
+        system.add_row(&row, p.distance, scale * p.weight);
     }
-    add_priors(frames, parts, reference, (&mut h, &mut g));
-    let fault = |why: &str| CaptureError::Solve {
-        stage: "registration of frames",
-        why: why.into(),
-    };
-    let factor = h
-        .cholesky()
-        .ok_or_else(|| fault("singular normal matrix"))?;
-    let x = factor.solve(&g);
-    match x.iter().all(|v| v.is_finite()) {
-        true => Ok(x),
-        false => Err(fault("the update is not finite")),
-    }
+    add_priors(frames, parts, reference, &mut system, settings);
+    system.solve("registration of frames")
 }
 
 fn add_priors(
     frames: &[RegisteredFrame],
     parts: &MovingParts,
     reference: usize,
-    (h, g): (&mut DMatrix<f64>, &mut DVector<f64>),
+    system: &mut DenseEquations,
+    settings: &MultiViewSettings,
 ) {
+    let weight = |deviation: f64| 1.0 / (deviation * deviation);
     for (k, frame) in frames.iter().enumerate() {
         let at = |part: usize| (k * parts.len() + part) * DOFS;
-        let step = if k == reference { HELD } else { STEP };
+        let is_held = k == reference;
+        let step = if is_held {
+            settings.held
+        } else {
+            settings.step
+        };
         for i in at(0)..at(parts.len()) {
-            h[(i, i)] += 1.0 / (step * step);
+            system.h[(i, i)] += weight(step);
         }
         for part in 1..parts.len() {
             let [of_parent, own] = frame.joints[part];
@@ -234,26 +196,11 @@ fn add_priors(
                     row.push((first + axis, sign));
                     row.extend((0..3).map(|c| (first + 3 + c, sign * moment[c])));
                 }
-                add_row((h, g), &row, of_parent[axis] - own[axis], JOINT);
+                system.add_row(&row, of_parent[axis] - own[axis], weight(settings.joint));
                 let turn = [(at(parent) + 3 + axis, 1.0), (at(part) + 3 + axis, -1.0)];
                 let bend = frame.turns[parent][axis] - frame.turns[part][axis];
-                add_row((h, g), &turn, bend, BEND);
+                system.add_row(&turn, bend, weight(settings.bend));
             }
-        }
-    }
-}
-
-fn add_row(
-    (h, g): (&mut DMatrix<f64>, &mut DVector<f64>),
-    row: &[(usize, f64)],
-    residual: f64,
-    deviation: f64,
-) {
-    let weight = 1.0 / (deviation * deviation);
-    for (i, a) in row {
-        g[*i] -= weight * a * residual;
-        for (j, b) in row {
-            h[(*i, *j)] += weight * a * b;
         }
     }
 }

@@ -3,9 +3,6 @@
 use crate::segment::BodyRegion;
 use serde::{Deserialize, Serialize};
 
-/// Largest gap between the yaws of a whole turn, degrees: a camera sees 60° to either side of the direction it faces.
-const WHOLE_TURN_GAP: f64 = 60.0;
-
 /// Report of one key frame.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct KeyFrameReport {
@@ -45,19 +42,16 @@ pub struct TurnReport {
 }
 
 impl TurnReport {
-    /// Sets the coverage from the yaws of the key frames.
-    pub(super) fn measure_coverage(&mut self) {
+    /// Sets the coverage from the yaws of the key frames; a whole turn has gaps up to the given one, degrees.
+    pub(super) fn measure_coverage(&mut self, whole_turn_gap: f64) {
         let mut yaws: Vec<f64> = self.used.iter().map(|k| k.yaw_degrees).collect();
         yaws.sort_by(f64::total_cmp);
         let next = yaws.iter().cycle().skip(1);
-        let gaps = yaws
-            .iter()
-            .zip(next)
-            .map(|(a, b)| (b - a).rem_euclid(360.0));
-        let largest = gaps.fold(0.0, f64::max);
+        let gaps = yaws.iter().zip(next).map(|(a, b)| b - a);
+        let largest = gaps.map(|g| g.rem_euclid(360.0)).fold(0.0, f64::max);
         let gap = if yaws.len() < 2 { 360.0 } else { largest };
         self.yaw_coverage_degrees = 360.0 - gap;
-        self.is_whole_turn = gap <= WHOLE_TURN_GAP;
+        self.is_whole_turn = gap <= whole_turn_gap;
     }
 }
 
@@ -76,7 +70,7 @@ mod tests {
                 used: yaws.iter().map(key).collect(),
                 ..TurnReport::default()
             };
-            report.measure_coverage();
+            report.measure_coverage(60.0);
             (report.yaw_coverage_degrees, report.is_whole_turn)
         };
         assert_eq!(of(&[]), (0.0, false));

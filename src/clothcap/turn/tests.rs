@@ -3,9 +3,10 @@
 use super::frame_points::camera_points;
 use super::key_frames::{KeyFrame, KeyFrames};
 use super::{TurnConfig, TurnError, TurnTracker, fuse};
-use crate::scan::BodyScan;
+use crate::align::start::scan_frame;
+use crate::scan::{BodyScan, bounds};
 use crate::segment::BodyRegion;
-use crate::virtual_camera::{bounds, scan_frame};
+use crate::settings::PersonSearchSettings;
 use nalgebra::{UnitQuaternion, Vector3};
 use std::f64::consts::{PI, TAU};
 use tryon_body::{BodyShape, BoneTransforms, Pose, embedded, skin};
@@ -26,18 +27,14 @@ fn views(count: usize) -> (KeyFrames, Vec<P3>) {
         let mut bones = BoneTransforms::default();
         pose.bones(template.skeleton(), &rest, &mut bones);
         let mut vertices = Vec::new();
-        skin(
-            Par::Seq,
-            &rest.vertices,
-            template.weights(),
-            &bones,
-            &mut vertices,
-        );
+        let weights = template.weights();
+        skin(Par::Seq, &rest.vertices, weights, &bones, &mut vertices);
         (pose, vertices)
     };
     let truth = posed(0.0, Vector3::zeros()).1;
-    let camera = VirtualCamera::around(bounds(&truth), 0.0);
+    let camera = VirtualCamera::around(bounds(&truth, 0.002), 0.0);
     let camera_from_world = camera.world_from_camera.inverse();
+    let config = TurnConfig::default();
     let frame = |k: usize| {
         let yaw = k as f64 / count as f64 * TAU;
         let yaw = if yaw > PI { yaw - TAU } else { yaw };
@@ -47,7 +44,7 @@ fn views(count: usize) -> (KeyFrames, Vec<P3>) {
             faces: template.mesh().faces().to_vec(),
             ..BodyScan::default()
         };
-        let image = scan_frame(&camera, &scan);
+        let image = scan_frame(&camera, &scan, &PersonSearchSettings::default());
         // Tracked poses lean on what faces the camera, and are late by a degree.
         let off = if k == 0 { 0.0 } else { 0.01 };
         let (pose, vertices) = posed(yaw - 2.0 * off, Vector3::new(0.3 * off, 0.0, off));
@@ -61,7 +58,7 @@ fn views(count: usize) -> (KeyFrames, Vec<P3>) {
                 root: camera_from_world * pose.root,
                 angles: pose.angles,
             },
-            points: camera_points(&image, &camera.calibration, &near, None),
+            points: camera_points(&image, &camera.calibration, &near, None, &config.points),
         }
     };
     let keys = KeyFrames {
@@ -92,11 +89,7 @@ fn views_all_around_meet_on_the_surface() {
     let after = fuse(&template, &keys, &TurnConfig::default()).expect("fused");
     let [off, near] = [&before, &after].map(|f| mean_distance(&f.scan.points, &truth));
     assert!(near < 0.002 && near < 0.5 * off, "{off} to {near}");
-    assert!(
-        after.report.is_whole_turn && after.report.unseen.is_empty(),
-        "{:?}",
-        after.report
-    );
+    assert!(after.report.is_whole_turn && after.report.unseen.is_empty());
     assert_eq!(after.report.reference, 0);
 }
 
@@ -133,10 +126,8 @@ fn regions_out_of_the_picture_are_unseen() {
 #[test]
 fn recordings_without_frames_or_people_are_refused() {
     let tracker = || {
-        TurnTracker::new(
-            embedded::template(),
-            Calibration::registered(Intrinsics::KINECT_V1),
-        )
+        let calibration = Calibration::registered(Intrinsics::KINECT_V1);
+        TurnTracker::new(embedded::template(), calibration)
     };
     assert_eq!(tracker().finish().expect_err("empty"), TurnError::Empty);
     let frame = RgbdFrame {
@@ -147,17 +138,12 @@ fn recordings_without_frames_or_people_are_refused() {
     };
     let mut alone = tracker();
     alone.step(&frame).expect("fits");
-    assert_eq!(
-        alone.finish().expect_err("nobody"),
-        TurnError::Nobody { frames: 1 }
-    );
+    let fault = alone.finish().expect_err("nobody");
+    assert_eq!(fault, TurnError::Nobody { frames: 1 });
     let small = RgbdFrame {
         depth: DepthImage::empty(2, 2),
         ..frame
     };
     let refused = tracker().step(&small).expect_err("another size");
-    assert!(
-        matches!(refused, TurnError::Frame { frame: 0, .. }),
-        "{refused}"
-    );
+    assert!(matches!(refused, TurnError::Frame { frame: 0, .. }));
 }

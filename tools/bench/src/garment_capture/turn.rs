@@ -9,7 +9,7 @@ use std::f64::consts::TAU;
 use std::time::Instant;
 use tryon_body::embedded;
 use tryon_clothcap::turn::{FusedTurn, KeyFrames, TurnConfig, TurnError, TurnTracker, fuse};
-use tryon_clothcap::{CaptureConfig, FrameCapture, OutfitCapture};
+use tryon_clothcap::{FrameCapture, OutfitCapture, OutfitCaptureConfig};
 use tryon_geometry::math::{P3, Rigid, World};
 use tryon_geometry::mesh::Face;
 use tryon_geometry::spatial::PointTree;
@@ -139,7 +139,7 @@ pub fn measure_turn_scene(scene: &TurnScene) -> Result<Vec<Row>, EvaluateError> 
     let whole = TurnConfig::default();
     let tracked = TurnConfig {
         iterations: 0,
-        ..whole.clone()
+        ..whole
     };
     let methods = [("tracked poses", tracked), ("registered", whole)];
     Ok(methods
@@ -169,7 +169,7 @@ fn measure_turn(
 fn capture(keys: &KeyFrames, config: &TurnConfig) -> Result<(FusedTurn, FrameCapture), TurnError> {
     let template = embedded::template();
     let fused = fuse(&template, keys, config)?;
-    let mut capture = OutfitCapture::new(template, CaptureConfig::default())?;
+    let mut capture = OutfitCapture::new(template, OutfitCaptureConfig::default())?;
     capture.start_at(fused.start.clone());
     let captured = capture.frame(&fused.scan)?;
     Ok((fused, captured))

@@ -7,6 +7,7 @@ use anyhow::{Context, Result};
 use serde_json::json;
 use std::time::Instant;
 use tryon::clothcap::align::Aligner;
+use tryon::clothcap::settings::AlignmentSettings;
 use tryon::formats::scan::{PlyMesh, write_ply};
 use tryon::geometry::par::with_threads;
 
@@ -18,7 +19,7 @@ pub(super) fn run(args: &ClothcapAlignArgs) -> Result<()> {
 
 fn align_all(args: &ClothcapAlignArgs) -> Result<()> {
     let mut scans = Scans::open(&args.scans)?;
-    let mut aligner = Aligner::new(scans.template.clone())?;
+    let mut aligner = Aligner::new(scans.template.clone(), AlignmentSettings::default())?;
     if let Some(start) = scans.start.take() {
         aligner.start_at(start);
     }

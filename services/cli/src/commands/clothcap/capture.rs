@@ -8,11 +8,12 @@ use anyhow::{Context, Result, ensure};
 use serde_json::json;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
+use tryon::clothcap::align::Start;
 use tryon::clothcap::archive::{CaptureArchive, CaptureHeader, FrameDisplacements, FrameRecord};
 use tryon::clothcap::picture::stages;
 use tryon::clothcap::scan::BodyScan;
 use tryon::clothcap::segment::BodyRegion;
-use tryon::clothcap::{CaptureConfig, FrameCapture, FrameReport, OutfitCapture};
+use tryon::clothcap::{FrameCapture, FrameReport, OutfitCapture, OutfitCaptureConfig};
 use tryon::formats::image::write_png_rgb;
 use tryon::geometry::par::with_threads;
 
@@ -29,10 +30,9 @@ fn capture_all(args: &ClothcapCaptureArgs) -> Result<()> {
     let archive = CaptureArchive::new(&args.out)?;
     let header = archive.header(&input::template(args.frame.body.as_deref())?)?;
     let mut scans = opened(args, header.as_ref())?;
-    let names: Vec<String> = scans.files.iter().map(|f| Scans::name(f)).collect();
     if let Some(h) = &header {
         ensure!(
-            h.scans == names,
+            h.scans == scans.names(),
             "{} holds the capture of other scans",
             args.out.display()
         );
@@ -41,23 +41,34 @@ fn capture_all(args: &ClothcapCaptureArgs) -> Result<()> {
         (Some(file), None) => Some(scans.minimal_shape(file)?),
         _ => None,
     };
-    let config = CaptureConfig {
+    let config = OutfitCaptureConfig {
         labels: label_config(args.prior.as_deref())?,
         without_skips: args.no_skip,
         minimal,
-        ..CaptureConfig::default()
+        ..OutfitCaptureConfig::default()
     };
-    let mut job = CaptureJob::new(config, archive, header, &mut scans)?;
-    let bar = input::progress(Some(names.len() as u64), "capturing");
+    let count = scans.files.len();
+    let mut job = CaptureJob {
+        start: scans.start.take(),
+        scans: &scans,
+        out: &args.out,
+        archive,
+        config,
+        header,
+        capture: None,
+        last: None,
+        read: None,
+    };
+    let bar = input::progress(Some(count as u64), "capturing");
     let mut rows = Vec::new();
     let mut unseen = Vec::new();
-    for (file, name) in scans.files.iter().zip(&names) {
+    for (at, file) in scans.files.iter().enumerate() {
         let started = Instant::now();
         let done = job
-            .scan(&scans, file, (name, &names), &args.out)
+            .scan(at)
             .with_context(|| format!("{}", file.display()))?;
         rows.push(json!({
-            "scan": name,
+            "scan": Scans::name(file),
             "report": done.report,
             "ms": started.elapsed().as_secs_f64() * 1e3,
         }));
@@ -73,9 +84,9 @@ fn capture_all(args: &ClothcapCaptureArgs) -> Result<()> {
     scans.write_report(&rows, &args.out)?;
     match &scans.turn {
         Some(report) => turn::print_unseen(report),
-        None => print_unseen(&unseen, names.len()),
+        None => print_unseen(&unseen, count),
     }
-    println!("{} scans captured, in {}", names.len(), args.out.display());
+    println!("{count} scans captured, in {}", args.out.display());
     Ok(())
 }
 
@@ -113,9 +124,11 @@ struct ScanDone {
 }
 
 /// Capture that continues where a stopped one ended.
-struct CaptureJob {
+struct CaptureJob<'a> {
+    scans: &'a Scans,
+    out: &'a Path,
     archive: CaptureArchive,
-    config: CaptureConfig,
+    config: OutfitCaptureConfig,
     header: Option<CaptureHeader>,
     /// Absent until the first scan that is not done.
     capture: Option<OutfitCapture>,
@@ -123,45 +136,24 @@ struct CaptureJob {
     last: Option<FrameRecord>,
     /// Scan before, if it was read.
     read: Option<BodyScan>,
-    start: Option<tryon::clothcap::align::Start>,
+    start: Option<Start>,
 }
 
-impl CaptureJob {
-    fn new(
-        config: CaptureConfig,
-        archive: CaptureArchive,
-        header: Option<CaptureHeader>,
-        scans: &mut Scans,
-    ) -> Result<Self> {
-        Ok(Self {
-            archive,
-            config,
-            header,
-            capture: None,
-            last: None,
-            read: None,
-            start: scans.start.take(),
-        })
-    }
-
-    /// Captures one scan unless it is done.
-    fn scan(
-        &mut self,
-        scans: &Scans,
-        file: &Path,
-        (name, names): (&str, &[String]),
-        out: &Path,
-    ) -> Result<ScanDone> {
+impl CaptureJob<'_> {
+    /// Captures the scan of this number unless it is done.
+    fn scan(&mut self, at: usize) -> Result<ScanDone> {
+        let (scans, file) = (self.scans, &self.scans.files[at]);
+        let name = &Scans::name(file);
         let before = self.archive.record(name, &scans.template)?;
         if let Some(record) = before.filter(|_| self.header.is_some()) {
             return Ok(self.done(record, None, true));
         }
         let scan = scans.read(file)?;
-        if let Some(record) = self.repeated(scans, &scan, (name, names), out)? {
+        if let Some(record) = self.repeated(at, &scan)? {
             return Ok(self.done(record, Some(scan), false));
         }
         if self.capture.is_none() {
-            self.capture = Some(self.begin(scans)?);
+            self.capture = Some(self.begin()?);
         }
         let capture = self.capture.as_mut().context("no capture")?;
         let frame = capture.frame(&scan)?;
@@ -169,9 +161,9 @@ impl CaptureJob {
         self.archive.write_textures(capture.textures())?;
         let header = match &self.header {
             Some(header) => header.clone(),
-            None => header_of(capture, scans, names)?,
+            None => header_of(capture, scans)?,
         };
-        let record = self.write(scans, &scan, (name, &frame), &header, out)?;
+        let record = self.write(name, &scan, &frame, &header)?;
         if self.header.is_none() {
             // After the first scan: a capture stopped before begins anew, since later scans are fitted in another way.
             self.archive.write_header(&header)?;
@@ -189,14 +181,9 @@ impl CaptureJob {
 
     /// Result of the scan before, for a scan that is unchanged. The first scan makes the outfit and is fitted in another way
     /// than those after it, so that the second one never repeats it.
-    fn repeated(
-        &mut self,
-        scans: &Scans,
-        scan: &BodyScan,
-        (name, names): (&str, &[String]),
-        out: &Path,
-    ) -> Result<Option<FrameRecord>> {
-        let at = names.iter().position(|n| n == name).unwrap_or_default();
+    fn repeated(&mut self, at: usize, scan: &BodyScan) -> Result<Option<FrameRecord>> {
+        let scans = self.scans;
+        let name = &Scans::name(&scans.files[at]);
         let (Some(header), Some(before)) = (&self.header, &self.last) else {
             return Ok(None);
         };
@@ -209,17 +196,18 @@ impl CaptureJob {
         if !self.read.as_ref().is_some_and(|b| b.is_unchanged(scan)) {
             return Ok(None);
         }
-        let picture = |name: &str| out.join(PICTURES).join(format!("{name}.png"));
-        let from = picture(&before.scan);
-        std::fs::copy(&from, picture(name)).with_context(|| format!("{}", from.display()))?;
-        Ok(Some(self.archive.repeat(
-            before,
-            name,
-            (header, &scans.template),
-        )?))
+        let from = self.picture(&before.scan);
+        std::fs::copy(&from, self.picture(name)).with_context(|| format!("{}", from.display()))?;
+        let record = self.archive.repeat(before, name, header, &scans.template)?;
+        Ok(Some(record))
     }
 
-    fn begin(&mut self, scans: &Scans) -> Result<OutfitCapture> {
+    fn picture(&self, name: &str) -> PathBuf {
+        self.out.join(PICTURES).join(format!("{name}.png"))
+    }
+
+    fn begin(&mut self) -> Result<OutfitCapture> {
+        let scans = self.scans;
         let template = scans.template.clone();
         let config = self.config.clone();
         let Some(header) = &self.header else {
@@ -238,36 +226,35 @@ impl CaptureJob {
         let clothed = header.clothed.clone();
         let last = last.unwrap_or_else(|| clothed.body.clone());
         let textures = self.archive.textures(header)?;
-        let capture =
-            OutfitCapture::resume(template, config, header.outfit.clone(), (clothed, last))?;
+        let outfit = header.outfit.clone();
+        let capture = OutfitCapture::resume(template, config, outfit, clothed, last)?;
         Ok(capture.with_textures(textures))
     }
 
     fn write(
         &self,
-        scans: &Scans,
+        name: &str,
         scan: &BodyScan,
-        (name, frame): (&str, &FrameCapture),
+        frame: &FrameCapture,
         header: &CaptureHeader,
-        out: &Path,
     ) -> Result<FrameRecord> {
         let capture = self.capture.as_ref().context("no capture")?;
         let textures = capture.textures();
         let picture = stages(capture.cloth(), scan, frame, &header.outfit, textures);
-        write_png_rgb(&out.join(PICTURES).join(format!("{name}.png")), &picture)?;
+        write_png_rgb(&self.picture(name), &picture)?;
         let record = FrameRecord {
             scan: name.to_owned(),
             body: frame.undressed.body.clone(),
             report: frame.report.clone(),
         };
-        let displacements = FrameDisplacements::of(&scans.template, frame);
+        let displacements = FrameDisplacements::of(&self.scans.template, frame);
         self.archive.write_frame(&record, &displacements)?;
         Ok(record)
     }
 }
 
 /// Header of a capture whose first scan is done.
-fn header_of(capture: &OutfitCapture, scans: &Scans, names: &[String]) -> Result<CaptureHeader> {
+fn header_of(capture: &OutfitCapture, scans: &Scans) -> Result<CaptureHeader> {
     let (outfit, clothed) = (capture.outfit(), capture.clothed());
     Ok(CaptureHeader {
         version: 0,
@@ -275,7 +262,7 @@ fn header_of(capture: &OutfitCapture, scans: &Scans, names: &[String]) -> Result
         frame: scans.frame,
         outfit: outfit.context("no outfit")?.clone(),
         clothed: clothed.context("no clothed template")?.clone(),
-        scans: names.to_vec(),
+        scans: scans.names(),
     })
 }
 

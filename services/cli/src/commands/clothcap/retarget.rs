@@ -13,6 +13,7 @@ use tryon::clothcap::align::Aligner;
 use tryon::clothcap::archive::{CaptureArchive, CaptureHeader, FrameDisplacements};
 use tryon::clothcap::picture::{Painted, PicturePanel, heading, part_color, sheet};
 use tryon::clothcap::scan::{BodyScan, ScanFrame};
+use tryon::clothcap::settings::AlignmentSettings;
 use tryon::clothcap::texture::GarmentTexture;
 use tryon::clothcap::{BodyDresser, CapturedOutfit, DressedPose, population};
 use tryon::formats::image::{encode_png_rgb, write_png_rgb};
@@ -73,16 +74,16 @@ fn retarget_all(args: &ClothcapRetargetArgs) -> Result<()> {
         shown: Vec::new(),
     };
     let mut rows = Vec::new();
-    for (name, body) in &bodies {
-        match batch.done(name)? {
+    for body in &bodies {
+        match batch.done(&body.name)? {
             Some(row) => {
-                batch.show_done(name, body)?;
+                batch.show_done(body)?;
                 rows.push(row);
                 // It says nothing of the time that the others take.
                 bar.dec_length(1);
             }
             None => {
-                rows.push(batch.dress(name, body)?);
+                rows.push(batch.dress(body)?);
                 bar.inc(1);
             }
         }
@@ -149,19 +150,19 @@ impl Batch<'_> {
     }
 
     /// Dresses one body in all frames and writes it; its row of the report.
-    fn dress(&mut self, name: &str, body: &RestBody) -> Result<Value> {
-        let frames = self.frames;
+    fn dress(&mut self, body: &NamedBody) -> Result<Value> {
+        let (name, frames) = (&body.name, self.frames);
         let started = Instant::now();
         let mut dressed = Vec::new();
         for frame in 0..frames.poses.len() {
-            dressed.push(self.dress_frame((name, body), frame)?);
+            dressed.push(self.dress_frame(body, frame)?);
         }
         let dressing = started.elapsed();
         let motion = DressedMotion {
             surface: self.dresser.surface(),
             header: self.header,
             textures: &self.textures,
-            body,
+            body: &body.rest,
             frames: &dressed,
             seconds: &frames.seconds,
             has_targets: self.args.motion.is_none(),
@@ -186,21 +187,17 @@ impl Batch<'_> {
         Ok(row)
     }
 
-    fn dress_frame(
-        &mut self,
-        (name, body): (&str, &RestBody),
-        frame: usize,
-    ) -> Result<DressedPose> {
+    fn dress_frame(&mut self, body: &NamedBody, frame: usize) -> Result<DressedPose> {
         let (pose, d) = (&self.frames.poses[frame], &self.frames.displacements[frame]);
-        let dressed = self.dresser.dress(body, d, pose);
-        dressed.with_context(|| name.to_owned())
+        let dressed = self.dresser.dress(&body.rest, d, pose);
+        dressed.with_context(|| body.name.clone())
     }
 
     /// Dresses a body that is done once more, for the contact sheet, as far as that has room for it.
-    fn show_done(&mut self, name: &str, body: &RestBody) -> Result<()> {
+    fn show_done(&mut self, body: &NamedBody) -> Result<()> {
         let frames = (0..self.frames.poses.len()).step_by(self.every());
         for frame in frames.take(self.room()) {
-            let dressed = self.dress_frame((name, body), frame)?;
+            let dressed = self.dress_frame(body, frame)?;
             self.shown.push(dressed);
         }
         Ok(())
@@ -280,23 +277,29 @@ fn on_motion(
     })
 }
 
-/// Named bodies of the command.
-fn bodies(
-    args: &ClothcapRetargetArgs,
-    template: &Arc<Template>,
-) -> Result<Vec<(String, RestBody)>> {
+/// Body with its name in results.
+struct NamedBody {
+    name: String,
+    rest: RestBody,
+}
+
+/// Bodies of the command.
+fn bodies(args: &ClothcapRetargetArgs, template: &Arc<Template>) -> Result<Vec<NamedBody>> {
     if let Some(path) = &args.body {
         let name = path.file_stem().map(|s| s.to_string_lossy().into_owned());
-        let body = other_body(path, template)?;
-        return Ok(vec![(name.unwrap_or_else(|| "body".into()), body)]);
+        return Ok(vec![NamedBody {
+            name: name.unwrap_or_else(|| "body".into()),
+            rest: other_body(path, template)?,
+        }]);
     }
     let count = args.population.unwrap_or(0);
     ensure!(count > 0, "--population: at least one body");
-    let named = |(k, shape): (usize, BodyShape)| (format!("{k:04}"), template.personalise(&shape));
-    let all = population(template, count, args.seed)
-        .into_iter()
-        .enumerate();
-    Ok(all.map(named).collect())
+    let all = population(template, count, args.seed);
+    let named = |(k, shape): (usize, &BodyShape)| NamedBody {
+        name: format!("{k:04}"),
+        rest: template.personalise(shape),
+    };
+    Ok(all.iter().enumerate().map(named).collect())
 }
 
 /// Body of another topology: the template fitted to its surface, in the rest pose.
@@ -309,7 +312,7 @@ fn other_body(path: &Path, template: &Arc<Template>) -> Result<RestBody> {
     };
     let scan = BodyScan::new(&file, &ScanFrame::default())
         .with_context(|| format!("{}", path.display()))?;
-    let mut aligner = Aligner::new(template.clone())?;
+    let mut aligner = Aligner::new(template.clone(), AlignmentSettings::default())?;
     aligner
         .align(&scan)
         .with_context(|| format!("{}", path.display()))?;

@@ -85,6 +85,11 @@ impl Scans {
         report::write(&out.join("report.json"), &report)
     }
 
+    /// Names of all scans in results.
+    pub(super) fn names(&self) -> Vec<String> {
+        self.files.iter().map(|f| Self::name(f)).collect()
+    }
+
     /// Name of a scan in results.
     pub(super) fn name(file: &Path) -> String {
         let stem = file.file_stem().map(|s| s.to_string_lossy().into_owned());
