@@ -17,11 +17,8 @@ use tryon_geometry::math::V3;
 
 /// Version of the layout. A folder of another one is refused.
 const VERSION: u32 = 2;
-/// File of [`CaptureHeader`].
 const HEADER: &str = "capture.json";
-/// Folder of the scans' results.
 const FRAMES: &str = "frames";
-/// Folder of the garments' textures.
 const TEXTURES: &str = "textures";
 
 /// Result of one scan.
@@ -248,7 +245,6 @@ fn write_vectors(path: &Path, vectors: &[V3]) -> Result<(), FormatError> {
     write_npy(path, &[vectors.len() as u64, 3], flat.into_iter())
 }
 
-/// Reads so many vectors.
 fn read_vectors(path: &Path, count: usize) -> Result<Vec<V3>, FormatError> {
     let (shape, flat) = read_npy(path)?;
     if shape != [count as u64, 3] {

@@ -29,7 +29,6 @@ pub struct CaptureHeader {
     pub scans: Vec<String>,
 }
 
-/// Field and fault.
 pub(super) type Fault = (String, String);
 
 fn check(holds: bool, field: &str, why: impl FnOnce() -> String) -> Result<(), Fault> {
@@ -65,7 +64,6 @@ fn check_all<T>(
     }
 }
 
-/// Checks pose and shape of a body.
 pub(super) fn check_body(
     body: &AlignedBody,
     template: &Template,
@@ -79,7 +77,6 @@ pub(super) fn check_body(
     check(is_finite, field, || "not finite".into())
 }
 
-/// Checks a header.
 pub(super) fn check_header(header: &CaptureHeader, template: &Arc<Template>) -> Result<(), Fault> {
     check(header.template == template.name(), "template", || {
         format!("{}, expected {}", header.template, template.name())
@@ -138,7 +135,6 @@ pub(super) fn check_header(header: &CaptureHeader, template: &Arc<Template>) -> 
     Ok(())
 }
 
-/// Fault of an index.
 const BEYOND: &str = "is beyond the last vertex";
 
 /// Counts that the indices of a part stay below.

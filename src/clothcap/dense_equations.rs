@@ -19,7 +19,6 @@ impl std::ops::AddAssign<&Self> for DenseEquations {
 }
 
 impl DenseEquations {
-    /// Empty equations of `n` unknowns.
     pub(crate) fn zeros(n: usize) -> Self {
         Self {
             h: DMatrix::zeros(n, n),

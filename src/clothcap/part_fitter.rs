@@ -28,7 +28,6 @@ pub(super) struct FittedParts {
 
 /// Fit of all parts to one segmented scan.
 pub(super) struct PartFitter<'a> {
-    /// Systems of the garments so far.
     pub(super) fits: &'a mut Vec<PartFit>,
     pub(super) cloth: &'a ClothTemplate,
     pub(super) scan: &'a BodyScan,

@@ -156,7 +156,6 @@ pub fn sheet(panels: &[PicturePanel<'_>], columns: usize) -> ColorImage {
     out
 }
 
-/// Rows of one panel.
 fn draw(panel: &PicturePanel<'_>, [w, h]: [u32; 2], settings: &PictureSettings) -> Vec<u8> {
     let turn = Rotation3::from_axis_angle(&V3::y_axis(), -panel.yaw);
     let finite = |p: &&P3| p.iter().all(|c| c.is_finite());

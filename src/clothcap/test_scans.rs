@@ -10,13 +10,11 @@ use tryon_geometry::math::{P3, Rigid, V3, World};
 use tryon_geometry::mesh::{Face, face_normal};
 use tryon_geometry::par::Par;
 
-/// Points of a test scan.
 const POINTS: usize = 20_000;
 /// Thickness of shirt and trousers, metres.
 const SHIRT: f32 = 0.010;
 const TROUSERS: f32 = 0.014;
 
-/// Scan with its truth.
 pub(super) struct TestScan {
     pub(super) file: ScanMesh,
     /// 0 skin, 1 shirt, 2 trousers, 3 shoes; shape `[points]`.
@@ -119,7 +117,6 @@ impl PaintedSurface<'_> {
     }
 }
 
-/// F1 of one label.
 pub(super) fn f1(truth: &[u8], found: &[u8], label: u8) -> f64 {
     let count = |f: &dyn Fn(u8, u8) -> bool| {
         truth.iter().zip(found).filter(|(t, g)| f(**t, **g)).count() as f64

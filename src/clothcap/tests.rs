@@ -1,7 +1,7 @@
 //! A whole capture of a synthetic scan: found, aligned, segmented, fitted, undressed, retargeted.
 
 use super::archive::{CaptureArchive, CaptureHeader, FrameDisplacements, FrameRecord};
-use super::segment::{LabelConfig, Slot};
+use super::segment::Slot;
 use super::test_scans::{TestScan, f1};
 use super::*;
 use tryon_body::{BodyShape, embedded};
@@ -144,19 +144,6 @@ fn a_stopped_capture_continues_where_it_ended() {
     let moved = worst(&again.garments, &second.garments);
     assert!(moved < 1e-5, "{moved}");
     assert_eq!(resumed.textures(), whole.textures());
-}
-
-#[test]
-fn a_given_prior_overrides_the_number_of_garments() {
-    let template = embedded::template();
-    let scan = TestScan::new(0.0, BLUE, GREY).scan();
-    let labels = LabelConfig {
-        slots: Some(vec![Slot::Top, Slot::Bottom]),
-        ..LabelConfig::default()
-    };
-    let mut segmenter = ScanSegmenter::new(template, labels).expect("a segmenter");
-    let found = segmenter.step(&scan).expect("segmented");
-    assert_eq!(found.parts().iter().max(), Some(&2));
 }
 
 #[test]

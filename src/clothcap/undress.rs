@@ -2,7 +2,7 @@
 
 use super::CaptureError;
 use super::align::{
-    AlignedBody, EVEN_EDGE, ModelFit, PosedBody, Pull, PullPlace, ScanPairing, ScanPoints,
+    AlignedBody, EVEN_EDGE, ModelFit, PosedSurface, Pull, PullPlace, ScanPairing, ScanPoints,
     SurfaceFit, SurfaceTerms, fit_shared_shape,
 };
 use super::multi::MultiCloth;
@@ -36,7 +36,6 @@ impl Undressed {
 /// Scan with the points that lie on garments.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct CoveredScan<'a> {
-    /// Scan.
     pub(super) scan: &'a BodyScan,
     /// Points on garments, shape `[points]`.
     pub(super) covered: &'a [bool],
@@ -57,9 +56,8 @@ pub fn minimal_shape(
     let skin = vec![false; scan.points.len()];
     let fit = ModelFit::new(template, scan, settings.samples, &align.model);
     let mut fit = fit.with_covered(&skin);
-    for stage in align.fine.iter().chain(&settings.stages) {
-        fit.run(&mut body, stage)?;
-    }
+    fit.run_all(&mut body, &align.fine)?;
+    fit.run_all(&mut body, &settings.stages)?;
     Ok(body.shape)
 }
 
@@ -100,7 +98,6 @@ pub(super) struct Undresser {
 }
 
 impl Undresser {
-    /// Prepares the system of a template.
     pub(super) fn new(
         template: Arc<Template>,
         model: ModelFitSettings,
@@ -168,7 +165,7 @@ impl Undresser {
         skips: bool,
     ) -> Result<Undressed, CaptureError> {
         let settings = &self.settings;
-        let PosedBody { vertices, bones } = body.posed(&self.template);
+        let PosedSurface { vertices, bones } = body.posed(&self.template);
         let (model, mut vertices) = (vertices.clone(), vertices);
         let area = self.template.mesh().area();
         let vertex = area / model.len().max(1) as f64;

@@ -108,7 +108,6 @@ impl<'a> ActiveVertices<'a> {
         energy.minimise_some(x, &some, self.settings.stop(), stage)
     }
 
-    /// Vertices so far.
     pub(crate) fn counts(&self) -> VertexCounts {
         self.counts
     }

@@ -4,7 +4,7 @@ use super::active_vertices::VertexCounts;
 use super::arms::LostArms;
 use super::free_surface::FreeSurface;
 use super::legs::leg_topology;
-use super::model_fit::{AlignedBody, ModelFit, PosedBody};
+use super::model_fit::{AlignedBody, ModelFit, PosedSurface};
 use super::scan_pairing::{QueryCounts, SurfaceMatch};
 use super::start::{Start, search_person};
 use crate::CaptureError;
@@ -82,7 +82,6 @@ pub struct Aligner {
     clothed: Option<ClothedTemplate>,
     /// Person of the first scan, if found before.
     start: Option<Start>,
-    /// Pose of the last scan.
     last: Option<AlignedBody>,
     /// Settled points keep their faces, and turns are tried only where they may help.
     skips: bool,
@@ -184,14 +183,10 @@ impl Aligner {
         };
         let mut fit = ModelFit::new(&template, scan, settings.samples, &settings.model);
         let mut body = start.body;
-        for stage in &settings.fine {
-            fit.run(&mut body, stage)?;
-        }
+        fit.run_all(&mut body, &settings.fine)?;
         let arms = LostArms::new(&template, scan, &settings.arms);
         if arms.search(&mut fit, &mut body)? {
-            for stage in &settings.fine[1..] {
-                fit.run(&mut body, stage)?;
-            }
+            fit.run_all(&mut body, &settings.fine[1..])?;
         }
         self.cut(leg_topology(&template, scan, &body, &settings.legs)?)?;
         let template = self.cloth.template().clone();
@@ -236,9 +231,7 @@ impl Aligner {
         let settings = &self.settings;
         let last = &self.last.as_ref().unwrap_or(&clothed.body).pose;
         let mut body = self.turned(last, clothed, fit, report);
-        for stage in &settings.later {
-            fit.run(&mut body, stage)?;
-        }
+        fit.run_all(&mut body, &settings.later)?;
         let arms = LostArms::new(&self.template, scan, &settings.arms);
         if arms.search(fit, &mut body)? {
             fit.run(&mut body, &settings.later[1])?;
@@ -250,9 +243,7 @@ impl Aligner {
                 pose: found.body.pose,
                 shape: clothed.body.shape.clone(),
             };
-            for stage in &settings.later {
-                fit.run(&mut other, stage)?;
-            }
+            fit.run_all(&mut other, &settings.later)?;
             if fit.error(&other) < fit.error(&body) {
                 body = other;
             }
@@ -307,7 +298,7 @@ impl Aligner {
         stages: &[SurfaceStage],
     ) -> Result<Alignment, CaptureError> {
         let model_error = fit.error(&body);
-        let PosedBody { vertices, bones } = fit.posed(&body);
+        let PosedSurface { vertices, bones } = fit.posed(&body);
         let (model, mut surface) = (vertices.clone(), vertices);
         // The first scan makes the clothed template; nothing is skipped in it.
         let skips = self.skips && self.last.is_some();

@@ -12,11 +12,9 @@ use tryon_body::{BoneTransforms, PosedSkin, RestBody, Template};
 use tryon_geometry::math::P3;
 use tryon_geometry::spatial::PointTree;
 
-/// Search of arms in one scan.
 pub(super) struct LostArms<'a> {
     template: &'a Template,
     settings: &'a ArmSearchSettings,
-    /// Some points of the scan.
     points: Vec<P3>,
 }
 
@@ -114,7 +112,6 @@ struct ArmSearch<'a> {
 }
 
 impl ArmSearch<'_> {
-    /// Posed vertices of the arm, metres.
     fn posed(&self, body: &AlignedBody) -> Vec<P3> {
         let (mut bones, skeleton) = (BoneTransforms::default(), self.template.skeleton());
         body.pose.bones(skeleton, &self.rest, &mut bones);

@@ -18,7 +18,6 @@ pub(super) struct Match {
     pub(super) corners: [f32; 3],
     pub(super) point: Vector3<f64>,
     pub(super) normal: Vector3<f64>,
-    /// Scan point minus surface point.
     pub(super) residual: Vector3<f64>,
     pub(super) weight: f64,
 }
@@ -29,7 +28,6 @@ pub(super) struct JacobianRows<'a> {
     pub(super) template: &'a Template,
     /// Weight of tangential beside normal distances.
     pub(super) tangential: f64,
-    /// Unknowns of the pose.
     pub(super) dofs: &'a [Dof],
     /// Displacement of each vertex per unit of each unknown of the shape.
     pub(super) fields: &'a [Vec<V3>],

@@ -17,7 +17,7 @@ mod unknowns;
 pub use active_vertices::VertexCounts;
 pub use aligner::{Aligner, Alignment, AlignmentReport, ClothedTemplate};
 pub use free_surface::FreeSurface;
-pub use model_fit::{AlignedBody, ModelFit, PosedBody};
+pub use model_fit::{AlignedBody, ModelFit, PosedSurface};
 pub(super) use quadratic::{EVEN_EDGE, Pull, PullPlace};
 pub use quadratic::{QuadraticEnergy, Stencil};
 pub use scan_pairing::{QueryCounts, SurfaceMatch};

@@ -30,8 +30,8 @@ pub struct AlignedBody {
 
 impl AlignedBody {
     /// Surface and bones of the body without displacements.
-    pub fn posed(&self, template: &Template) -> PosedBody {
-        let mut out = PosedBody::default();
+    pub fn posed(&self, template: &Template) -> PosedSurface {
+        let mut out = PosedSurface::default();
         out.place(template, &self.pose, &rest_of(template, &self.shape), None);
         out
     }
@@ -50,14 +50,14 @@ fn rest_of(template: &Template, shape: &BodyShape) -> RestBody {
 
 /// Surface of a body in a pose.
 #[derive(Clone, Debug, Default)]
-pub struct PosedBody {
+pub struct PosedSurface {
     /// Vertices, metres, shape `[vertices]`.
     pub vertices: Vec<P3>,
     /// Bones of the pose.
     pub bones: BoneTransforms,
 }
 
-impl PosedBody {
+impl PosedSurface {
     /// Poses a rest body; `offsets` are its pose blend shapes if they are known, since shape leaves them as they are.
     fn place(
         &mut self,
@@ -98,14 +98,12 @@ pub struct ModelFit<'a> {
     near: Vec<Option<u32>>,
     /// Searches start there: of two faces equally near, another one may be found.
     starts_near: bool,
-    /// Vertices of head, hands and feet.
     bare: Vec<bool>,
-    /// Vertices below hair.
     scalp: Vec<bool>,
     bvh: Bvh,
     /// Shape of the last pose and its rest body.
     rest: Option<(BodyShape, RestBody)>,
-    posed: PosedBody,
+    posed: PosedSurface,
     angles: AnglePriors,
 }
 
@@ -135,7 +133,7 @@ impl<'a> ModelFit<'a> {
             scalp: scalp(template),
             bvh: Bvh::new(mesh.faces(), mesh.vertices()),
             rest: None,
-            posed: PosedBody::default(),
+            posed: PosedSurface::default(),
             angles: AnglePriors::new(template, settings),
         }
     }
@@ -171,8 +169,8 @@ impl<'a> ModelFit<'a> {
     }
 
     /// Surface and bones of a body.
-    pub fn posed(&self, body: &AlignedBody) -> PosedBody {
-        let mut out = PosedBody::default();
+    pub fn posed(&self, body: &AlignedBody) -> PosedSurface {
+        let mut out = PosedSurface::default();
         out.place(self.template, &body.pose, &self.rest(&body.shape), None);
         out
     }
@@ -248,6 +246,18 @@ impl<'a> ModelFit<'a> {
         })
     }
 
+    /// Runs some stages; `body` is start and result.
+    ///
+    /// # Errors
+    /// As [`ModelFit::run`].
+    pub fn run_all(
+        &mut self,
+        body: &mut AlignedBody,
+        stages: &[FitStage],
+    ) -> Result<(), CaptureError> {
+        stages.iter().try_for_each(|stage| self.run(body, stage))
+    }
+
     /// Runs one stage; `body` is start and result.
     ///
     /// # Errors
@@ -313,7 +323,7 @@ impl<'a> ModelFit<'a> {
 
     /// Displacement of each posed vertex per unit of each shape unknown.
     fn shape_fields(&self, body: &AlignedBody, unknowns: &ShapeUnknowns) -> Vec<Vec<V3>> {
-        let mut moved = PosedBody::default();
+        let mut moved = PosedSurface::default();
         let step = self.settings.shape_step;
         let offsets = self.template.pose_offsets(&self.posed.bones);
         let offsets = offsets.map_or_else(Vec::new, |o| o.all(Par::Rayon));
@@ -352,7 +362,6 @@ impl<'a> ModelFit<'a> {
     }
 }
 
-/// Prior of one stage.
 pub(super) struct Prior<'a> {
     pub(super) start: &'a Pose<World>,
     pub(super) unknowns: &'a ShapeUnknowns,
@@ -393,9 +402,8 @@ mod tests {
         };
         let mut fit = ModelFit::new(&template, &scan, 3000, &ModelFitSettings::default());
         let mut found = bent(&template, 0.5);
-        for stage in [FitStage::posed(0.08, 10), FitStage::posed(0.03, 10)] {
-            fit.run(&mut found, &stage).expect("solved");
-        }
+        let stages = [0.08, 0.03].map(|sigma| FitStage::posed(sigma, 10));
+        fit.run_all(&mut found, &stages).expect("solved");
         let error = |(a, b): (&P3, &P3)| (a - b).norm();
         let errors = fit.posed(&found).vertices;
         errors.iter().zip(&scan.points).map(error).sum::<f32>() / errors.len() as f32

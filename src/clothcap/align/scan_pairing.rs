@@ -14,7 +14,6 @@ use tryon_tracking::registration::GemanMcClure;
 /// Points of a scan that are paired with a surface.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct ScanPoints<'a> {
-    /// Scan.
     pub(crate) scan: &'a BodyScan,
     /// Step from one that takes part to the next; at least 1.
     pub(crate) stride: usize,
@@ -96,7 +95,6 @@ impl std::ops::AddAssign for QueryCounts {
     }
 }
 
-/// Extent of a search.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum FaceSearch {
     /// None: the face in the cache.
@@ -130,7 +128,6 @@ pub(crate) struct ScanPairing {
     kept: Vec<Option<KeptFace>>,
     /// Travel of each face so far: the sum of the largest motions of its corners, metres.
     travel: Vec<f32>,
-    /// Surface of the last iteration.
     last: Vec<P3>,
     counts: QueryCounts,
 }
@@ -303,7 +300,6 @@ impl ScanPairing {
         }
     }
 
-    /// Queries so far.
     pub(crate) fn counts(&self) -> QueryCounts {
         self.counts
     }

@@ -83,9 +83,7 @@ pub(super) fn search_person(
             continue;
         };
         compared += 1;
-        for stage in &settings.stages {
-            fit.run(&mut body, stage)?;
-        }
+        fit.run_all(&mut body, &settings.stages)?;
         let error = fit.error(&body);
         if best.as_ref().is_none_or(|b| error < b.error) {
             best = Some(Start {
@@ -129,7 +127,6 @@ fn tracked(
     })
 }
 
-/// Depth frame of a scan.
 pub(crate) fn scan_frame(
     camera: &VirtualCamera,
     scan: &BodyScan,

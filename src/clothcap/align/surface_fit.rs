@@ -22,9 +22,7 @@ pub(crate) struct SurfaceTerms<'a> {
     pub(crate) smoothness: &'a [f64],
     /// Weight of each vertex's pull to the model's: settles what no other term determines.
     pub(crate) anchor: f64,
-    /// Most iterations.
     pub(crate) iterations: usize,
-    /// Solves.
     pub(crate) settings: &'a SurfaceFitSettings,
 }
 
@@ -43,7 +41,6 @@ pub struct SurfaceFitReport {
     pub vertices: VertexCounts,
 }
 
-/// Fit of the vertices of one mesh.
 #[derive(Debug)]
 pub(crate) struct SurfaceFit {
     /// Name of the solve in faults.
@@ -114,7 +111,6 @@ impl SurfaceFit {
         })
     }
 
-    /// Edges of the mesh.
     pub(crate) fn edges(&self) -> &[[u32; 2]] {
         &self.edges
     }
@@ -132,7 +128,6 @@ impl SurfaceFit {
         }
     }
 
-    /// Vertices near those of the model.
     fn anchor(&mut self, terms: &SurfaceTerms<'_>) {
         for (v, p) in (0..).zip(terms.model) {
             self.energy.add_vertex(v, terms.anchor, p);

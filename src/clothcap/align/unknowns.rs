@@ -24,8 +24,8 @@ impl AnglePriors {
             let at = skeleton.dof_offset(j);
             let own = at..at + joint.motion.dofs();
             let precision = match template.parts().segment(j) {
-                Neck | Head => settings.straight_head.powi(-2),
-                Abdomen | Chest => settings.straight_spine.powi(-2),
+                Neck | Head => settings.straight_head.powf(-2.0),
+                Abdomen | Chest => settings.straight_spine.powf(-2.0),
                 Collar | Hand | Fingers | Foot | Toes => 0.0,
                 _ => continue,
             };
@@ -62,7 +62,6 @@ impl ShapeUnknown {
     }
 }
 
-/// Shape unknowns of a stage.
 pub(super) struct ShapeUnknowns {
     pub(super) all: Vec<ShapeUnknown>,
     /// Standard deviation of the scale of a bone.

@@ -63,7 +63,6 @@ impl MultiCloth {
     }
 }
 
-/// Cut of a labelled template.
 struct PartCutter<'a> {
     cloth: &'a ClothTemplate,
     labelling: &'a Labelling,

@@ -113,7 +113,6 @@ impl PartScan {
 #[derive(Debug)]
 pub struct PartFit {
     part: ClothPart,
-    /// Vertices of its rings.
     ring: Vec<u32>,
     fit: SurfaceFit,
     pairing: ScanPairing,

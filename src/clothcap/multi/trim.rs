@@ -48,7 +48,6 @@ pub(crate) fn grow(around: &Csr, marked: &mut [bool]) {
     }
 }
 
-/// Cloth whose vertices move.
 struct Cloth {
     faces: Vec<Face>,
     x: Vec<P3>,

@@ -24,7 +24,6 @@ impl Labelling {
         }
     }
 
-    /// Connected nodes of a label.
     fn pieces(&self, label: u8, around: &Csr) -> Vec<Vec<u32>> {
         let mut all = around.components(|v, w| self.labels[v] == self.labels[w]);
         all.retain(|piece| self.labels[piece[0] as usize] == label);

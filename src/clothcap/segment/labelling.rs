@@ -104,7 +104,6 @@ pub(super) struct Labeller<'a> {
     pub(super) bottom: Vec<bool>,
     /// Nodes of torso and arms in one of two garments there; `true` for the one that the torso has less of.
     pub(super) second_top: Vec<Option<bool>>,
-    /// Tops reach down to the thighs.
     pub(super) is_top_long: bool,
     /// Nodes between the legs without a scan point.
     empty: Vec<bool>,

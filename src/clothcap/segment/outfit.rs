@@ -95,7 +95,6 @@ impl Labeller<'_> {
             && dyes.is_none_or(|(shoes, skin)| (shoes - skin).norm() > settings.dye)
     }
 
-    /// Median colour of nodes without light.
     fn dye(&self, nodes: &[usize]) -> Option<Vector3<f64>> {
         medians(&self.colors(nodes)).map(Vector3::from)
     }
@@ -141,7 +140,6 @@ impl Labeller<'_> {
     }
 }
 
-/// Labels of top and bottom.
 fn ends(found: &Labelling) -> Option<[usize; 2]> {
     let at = |slot: Slot| found.slots.iter().position(|s| *s == slot);
     Some([at(Slot::Top)?, at(Slot::Bottom)?])

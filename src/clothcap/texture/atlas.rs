@@ -171,7 +171,6 @@ impl TextureAtlas {
     }
 }
 
-/// Charts in their planes.
 struct FlatCharts {
     /// Least and greatest coordinates of each chart, metres.
     bounds: Vec<[[f32; 2]; 2]>,

@@ -11,7 +11,6 @@ const AXES: usize = 6;
 /// Faces that are projected along one axis.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Chart {
-    /// Faces, ascending.
     pub(super) faces: Vec<u32>,
     axis: usize,
 }

@@ -5,7 +5,6 @@
 pub(super) struct Packing {
     /// Upper left corner of each rectangle, shape `[rectangles]`.
     pub(super) corners: Vec<[u32; 2]>,
-    /// Rows that they need.
     pub(super) height: u32,
 }
 

@@ -7,7 +7,6 @@ use std::f32::consts::TAU;
 use tryon_geometry::math::{P3, V3};
 use tryon_geometry::mesh::Face;
 
-/// Texel of the tests, metres.
 const TEXEL: f32 = 0.002;
 
 /// An upright tube of 0.15 m radius and 0.5 m height, open at both ends.

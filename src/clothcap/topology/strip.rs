@@ -7,9 +7,7 @@ use tryon_geometry::mesh::{Face, face_normal};
 /// Vertex between two others: share 0 is the first, 1 the second.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Between {
-    /// Vertices of the body.
     pub(super) ends: [u32; 2],
-    /// Share of the second one.
     pub(super) share: f32,
 }
 
@@ -27,9 +25,7 @@ impl Between {
 /// New vertices, numbered from the body's count on, and faces.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Strip {
-    /// New vertices.
     pub(super) vertices: Vec<Between>,
-    /// Faces.
     pub(super) faces: Vec<Face>,
 }
 

@@ -57,7 +57,6 @@ fn color_at(image: &ColorImage, calibration: &Calibration, point: &P3) -> [u8; 3
     }
 }
 
-/// Depth image with its camera.
 struct DepthReader<'a> {
     depth: &'a DepthImage,
     camera: &'a Intrinsics,

@@ -1,7 +1,7 @@
 //! Points of many poses in one: each point moves with the surface that it lies on.
 
 use super::moving_parts::MovingParts;
-use crate::align::PosedBody;
+use crate::align::PosedSurface;
 use crate::scan::BodyScan;
 use crate::settings::FusedCloudSettings;
 use nalgebra::{Isometry3, Matrix4, Vector3};
@@ -82,7 +82,7 @@ pub(super) struct Reference<'a> {
 
 impl Reference<'_> {
     /// Takes points, world, metres, from the pose in which they were seen.
-    pub(super) fn reposed(&self, points: &BodyScan, from: &PosedBody) -> Vec<FusedPoint> {
+    pub(super) fn reposed(&self, points: &BodyScan, from: &PosedSurface) -> Vec<FusedPoint> {
         let bvh = Bvh::new(self.template.mesh().faces(), &from.vertices);
         let weights = self.template.weights();
         let skins = [&from.bones, self.bones].map(|bones| PosedSkin::blended(weights, bones));

@@ -5,7 +5,7 @@ use super::key_frames::{KeyFrame, KeyFrames, moved};
 use super::moving_parts::MovingParts;
 use super::multi_view::{RegisteredFrame, measure, register};
 use super::{KeyFrameReport, TurnError, TurnReport};
-use crate::align::{AlignedBody, FreeSurface, ModelFit, PosedBody, Start};
+use crate::align::{AlignedBody, FreeSurface, ModelFit, PosedSurface, Start};
 use crate::scan::BodyScan;
 use crate::segment::{BodyRegion, unseen_regions};
 use crate::settings::{AlignmentSettings, FreeSurfaceSettings, LabelSettings, TurnConfig};
@@ -134,9 +134,9 @@ fn posed_as(
         settings: &config.cloud,
     };
     let one = |key: &KeyFrame| {
-        let mut from = PosedBody {
+        let mut from = PosedSurface {
             bones: bones_of(key),
-            ..PosedBody::default()
+            ..PosedSurface::default()
         };
         let (weights, vertices) = (template.weights(), &mut from.vertices);
         skin(Par::Rayon, &rest.vertices, weights, &from.bones, vertices);

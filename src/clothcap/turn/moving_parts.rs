@@ -6,7 +6,6 @@ use tryon_body::parts::BodyPart;
 /// Parts of the body that move as one: pelvis, chest, head, arms, legs.
 #[derive(Debug)]
 pub(super) struct MovingParts {
-    /// Part of each bone.
     of_bone: Vec<usize>,
     /// Joint that ties each part to its parent; the pelvis' own is unused.
     pub(super) joints: Vec<usize>,
@@ -45,12 +44,10 @@ impl MovingParts {
         }
     }
 
-    /// Number of parts.
     pub(super) fn len(&self) -> usize {
         self.joints.len()
     }
 
-    /// Part of a bone.
     pub(super) fn of(&self, bone: usize) -> usize {
         self.of_bone[bone]
     }

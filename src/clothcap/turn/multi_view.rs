@@ -20,7 +20,6 @@ const DOFS: usize = 6;
 
 /// Points of one frame in the pose of the reference.
 pub(super) struct RegisteredFrame {
-    /// Points.
     pub(super) points: Vec<FusedPoint>,
     /// Yaw at which they were seen, radians.
     pub(super) yaw: f64,
@@ -78,7 +77,6 @@ pub(super) fn register(
     Ok(())
 }
 
-/// Sets the error of each frame.
 pub(super) fn measure(frames: &mut [RegisteredFrame], settings: &MultiViewSettings) {
     let pairs = pair(frames, settings.reach[0], settings.sigma[0], settings);
     for (k, frame) in frames.iter_mut().enumerate() {
