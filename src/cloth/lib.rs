@@ -48,8 +48,7 @@
 //! - Membrane (Volino et al. 2009): [`mod@elastic::membrane`], laws: [`mod@elastic::stretch_law`],
 //!   [`mod@elastic::bend_law`].
 //! - Those of measured fabrics (Wang et al. 2011): [`mod@elastic::measured_stretch`], [`mod@elastic::measured_bend`].
-//! - Dihedral angles with both derivatives: [`mod@elastic::dihedral`].
-//! - Hinges: [`mod@elastic::hinge`].
+//! - Dihedral angles: [`mod@elastic::dihedral`].
 //! - A curvature tensor a vertex from the angles around it: [`mod@elastic::curvature_set`], its weights:
 //!   [`mod@elastic::curvature_weights`].
 //! - Rest shapes: [`mod@elastic::rest_sheet`].
@@ -79,6 +78,7 @@ pub mod elastic;
 pub mod fine;
 pub mod live;
 pub mod scene;
+pub mod settings;
 
 pub use live::{
     AnchorBinding, ClothError, Config, Element, GarmentState, Hinge, Input, Model, Outfit, Sheet,

@@ -112,7 +112,7 @@ fn simulator(
     let timer = Instant::now();
     let anchors = vec![Vec::new(); garments.len()];
     let outfit = Outfit { garments, anchors };
-    let model = Model::new(template, outfit, config.clone())?;
+    let model = Model::new(template, outfit, *config)?;
     Ok((model, ms(timer)))
 }
 

@@ -6,7 +6,7 @@
 use super::settings::HoodDrapeSettings;
 use tryon_cloth::Sheet;
 use tryon_cloth::contact::SurfaceModel;
-use tryon_cloth::self_contact::{Search, SelfContactFrame, SelfContactModel};
+use tryon_cloth::self_contact::{Search, SelfContactFrame, SelfContactModel, SelfContactSettings};
 use tryon_garment::{GarmentError, GarmentMesh, Placement};
 use tryon_geometry::math::{P3, V3, V3d};
 use tryon_geometry::par::Par;
@@ -69,7 +69,8 @@ impl Hood {
         }
         let parts = mesh.regions.iter().map(|r| r.decisive().0).collect();
         let surface = SurfaceModel::new(mesh.faces.clone(), mesh.topology()?, parts);
-        let model = SelfContactModel::new(surface, sheet.edges.iter().map(|e| e.1 as f32));
+        let lengths = sheet.edges.iter().map(|e| e.1 as f32);
+        let model = SelfContactModel::new(surface, lengths, SelfContactSettings::default());
         Ok(Some(Self {
             search: model.search_all(settings.thickness, settings.reach),
             settings,

@@ -6,7 +6,7 @@ use tryon_cloth::contact::{
     ClosestPoint, CollisionBody, CollisionError, CollisionModel, CollisionWorkspace, Part,
     SkinGrid, SurfaceFrame, SurfaceModel,
 };
-use tryon_cloth::sleeve_rings::{Arms, CentreLine};
+use tryon_cloth::sleeve_rings::{Arms, CentreLine, SleeveSettings};
 use tryon_cloth::{ClothError, Config, collision_model};
 use tryon_geometry::math::P3;
 
@@ -25,7 +25,7 @@ impl SkinModel {
     pub(super) fn new(template: &Template, config: &Config) -> Result<Self, ClothError> {
         Ok(Self {
             collision: collision_model(template, config)?,
-            arms: Arms::new(template, &vertex_masks(template)),
+            arms: Arms::new(template, &vertex_masks(template), SleeveSettings::default()),
         })
     }
 }
@@ -58,7 +58,7 @@ impl<'a> Skin<'a> {
     pub(super) fn place(&mut self, posed: &[P3]) -> Result<(), CollisionError> {
         self.body
             .place(&self.whole.collision, posed, &mut self.work)?;
-        self.grid.fill(self.body.frame());
+        self.grid.fill(self.model, self.body.frame());
         Ok(())
     }
     pub(super) fn frame(&self) -> &SurfaceFrame {

@@ -43,7 +43,7 @@ fn dressed_as(
             min_angle: 8.0,
             ..Triangulation::default()
         },
-        config: config.clone(),
+        config: *config,
         ..DressOptions::default()
     };
     let d = dress(&template, rest, pose, &patterns, &options).expect("dressed");
@@ -191,10 +191,10 @@ fn still_cloth_sleeps_and_wakes() {
     // Awake, it would have stayed where it is to within a millimetre or two.
     let Dressed { mut model, .. } = d;
     let before = state.garments.clone();
-    let config = model.config().clone();
+    let config = *model.config();
     model.replace_config(Config {
         sleep: false,
-        ..config.clone()
+        ..config
     });
     for _ in 0..30 {
         step_on(&model, &mut state, &d.body, &mut work).expect("a step");
@@ -256,7 +256,7 @@ fn cloth_on_a_body_that_sways_rides_asleep() {
             .collect::<Vec<_>>()
     };
     let mut run = |sleep: bool| {
-        let config = d.model.config().clone();
+        let config = *d.model.config();
         d.model.replace_config(Config { sleep, ..config });
         let (mut state, mut work, mut slept) = (d.state.clone(), Workspace::default(), 0);
         for i in 0..300 {

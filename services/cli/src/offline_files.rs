@@ -9,6 +9,13 @@ use tryon::cloth::fine::OfflineSolver;
 use tryon::formats::NpyFrames;
 use tryon::geometry::math::P3;
 
+/// Vertices of the files; no body.npy for `None`.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct VertexCounts {
+    pub(crate) cloth: usize,
+    pub(crate) body: Option<usize>,
+}
+
 /// Positions of the frames so far, the checkpoint after the last, and the request to end.
 #[derive(Debug)]
 pub(crate) struct OfflineFiles {
@@ -35,15 +42,14 @@ pub(crate) fn saved_state(args: &SolverArgs) -> Result<Option<Vec<u8>>> {
 }
 
 impl OfflineFiles {
-    /// positions.npy and body.npy in `out`, of so many vertices (no body.npy for `None`), and the checkpoint of `args`, after
-    /// `frames` frames of an earlier run.
+    /// positions.npy and body.npy in `out`, and the checkpoint of `args`, after `frames` frames of an earlier run.
     ///
     /// # Errors
     /// Files that cannot be written, or positions that do not belong to the checkpoint.
     pub(crate) fn open(
         args: &SolverArgs,
         out: &Path,
-        (cloth, body): (usize, Option<usize>),
+        vertices: VertexCounts,
         frames: usize,
     ) -> Result<Self> {
         let open = |name: &str, vertices| match frames {
@@ -51,8 +57,8 @@ impl OfflineFiles {
             n => NpyFrames::resume(&out.join(name), vertices, n),
         };
         Ok(Self {
-            positions: open("positions.npy", cloth)?,
-            body: body.map(|n| open("body.npy", n)).transpose()?,
+            positions: open("positions.npy", vertices.cloth)?,
+            body: (vertices.body).map(|n| open("body.npy", n)).transpose()?,
             checkpoint: args.checkpoint.clone(),
             interrupt: Interrupt::watch()?,
         })

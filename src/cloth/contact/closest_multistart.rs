@@ -3,9 +3,6 @@
 use super::{ClosestPoint, SearchExtent, SurfaceFrame, SurfaceModel};
 use tryon_geometry::math::P3;
 
-/// Depth beyond which a result is distrusted, metres: a point outside the skin a step ago is not deeper.
-const DISTRUSTED_DEPTH: f32 = 0.01;
-
 impl SurfaceModel {
     /// As [`Self::closest_within`], for a point `p` that was outside a step ago.
     ///
@@ -21,7 +18,7 @@ impl SurfaceModel {
     ) -> (u32, Result<ClosestPoint, f32>) {
         let from = |start: u32| self.closest_within(frame, p, start, extent);
         let walked = from(start);
-        let deep = |c: ClosestPoint| c.signed_distance < -DISTRUSTED_DEPTH;
+        let deep = |c: ClosestPoint| c.signed_distance < -self.settings.distrusted_depth;
         if !walked.1.is_ok_and(deep) {
             return walked;
         }

@@ -43,23 +43,12 @@ pub struct SearchExtent {
     pub reach: f32,
 }
 
-/// Longest walk, edges (30 cm on a body of 13k vertices): a longer one began at a lost start.
-const MAX_WALK: usize = 40;
-/// Slack between the nearest vertex and the closest point of the faces around it, metres: an edge of the body.
-const EDGE: f32 = 0.03;
-/// A corner with less barycentric weight has no part in a point.
-const MIN_WEIGHT: f32 = 1e-4;
-/// Distance beyond which the direction to the query replaces the interpolated normal, metres.
-const DIRECT_NORMAL: f32 = 2e-3;
-/// Cosine between that direction and the interpolated normal below which the latter stays.
-const DIRECT_NORMAL_COS: f32 = 0.5;
-
 impl SurfaceModel {
     /// Walks from `start` to a vertex nearer to `p` than all its neighbours in `mask`.
     pub fn walk(&self, frame: &SurfaceFrame, p: &P3, start: u32, mask: Part) -> u32 {
         let mut at = start;
         let mut best = (frame.vertices[at as usize] - p).norm_squared();
-        for _ in 0..MAX_WALK {
+        for _ in 0..self.settings.max_walk {
             let mut next = at;
             for &n in self.neighbours(at) {
                 let d = (frame.vertices[n as usize] - p).norm_squared();
@@ -108,9 +97,9 @@ impl SurfaceModel {
         let outside = (p - point).dot(&normal) >= 0.0;
         let distance = square.sqrt();
         // Exact at edges and corners, where the interpolated normal is not.
-        if distance > DIRECT_NORMAL {
+        if distance > self.settings.direct_normal {
             let along = (p - point) / distance * if outside { 1.0 } else { -1.0 };
-            if along.dot(&normal) > DIRECT_NORMAL_COS {
+            if along.dot(&normal) > self.settings.direct_normal_cosine {
                 normal = along;
             }
         }
@@ -169,7 +158,7 @@ impl SurfaceModel {
     ) -> (u32, Result<ClosestPoint, f32>) {
         let SearchExtent { mask, reach } = extent;
         let v = self.walk(frame, p, start, mask);
-        let beyond = (frame.vertices[v as usize] - p).norm() - EDGE - reach;
+        let beyond = (frame.vertices[v as usize] - p).norm() - self.settings.edge - reach;
         if beyond > 0.0 {
             return (v, Err(beyond));
         }
@@ -199,7 +188,7 @@ impl SurfaceModel {
     /// The point lies on the border of an open surface, where inside and outside are undefined.
     pub fn is_on_border(&self, c: &ClosestPoint) -> bool {
         let f = self.faces[c.face as usize];
-        (0..3).all(|k| c.weights[k] < MIN_WEIGHT || self.border[f[k] as usize])
+        (0..3).all(|k| c.weights[k] < self.settings.min_weight || self.border[f[k] as usize])
     }
 
     /// Constraint that keeps `p` below an open surface worn over it, from the closest point `hit`.

@@ -5,22 +5,12 @@ use super::interior::Interior;
 use super::joint_clearance::JointClearance;
 use super::part_clearance::PartClearance;
 use super::{Part, SurfaceFrame, SurfaceModel};
+use crate::settings::CollisionConfig;
 use serde::{Deserialize, Serialize};
 use tryon_geometry::math::P3;
 use tryon_geometry::mesh::{MeshError, Topology, TriMesh};
-use tryon_geometry::par::{self, Par};
+use tryon_geometry::par;
 use tryon_geometry::spatial::Bvh;
-
-/// Settings of a collision body.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct CollisionConfig {
-    /// Displacement between steps from which on a vertex is followed fully, metres; 0 follows the posed body exactly.
-    pub noise_deadband: f64,
-    /// Clearance between parts that press on each other and in bent joints, metres.
-    pub clearance: f32,
-    /// Threads.
-    pub par: Par,
-}
 
 /// A posed body that does not fit the model.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
@@ -76,7 +66,8 @@ impl CollisionModel {
         parts: CollisionParts,
         config: CollisionConfig,
     ) -> Result<Self, MeshError> {
-        let surface = SurfaceModel::new(mesh.faces().to_vec(), Topology::new(mesh)?, parts.own);
+        let mut surface = SurfaceModel::new(mesh.faces().to_vec(), Topology::new(mesh)?, parts.own);
+        surface.settings = config.surface;
         let joint = |segments| JointClearance::new(&surface, segments);
         Ok(Self {
             joints: parts.hinges.into_iter().filter_map(joint).collect(),
@@ -89,6 +80,7 @@ impl CollisionModel {
     }
     /// Replaces the settings.
     pub fn set_config(&mut self, config: CollisionConfig) {
+        self.surface.settings = config.surface;
         self.config = config;
     }
     /// Connectivity and parts.
@@ -233,14 +225,7 @@ impl CollisionBody {
         work.filtered.clear();
         work.filtered
             .extend_from_slice(last.map_or(posed, |v| &v[..]));
-        let config = &model.config;
-        filter_body(
-            config.par,
-            &mut work.filtered,
-            posed,
-            config.noise_deadband,
-            dt,
-        );
+        filter_body(&model.config, &mut work.filtered, posed, dt);
     }
 
     /// Separation stage: takes the filtered body over with the clearances between parts and in joints.
@@ -258,13 +243,10 @@ impl CollisionBody {
     }
 
     fn apply_clearances(&mut self, model: &CollisionModel) -> usize {
-        let CollisionConfig { par, clearance, .. } = model.config;
-        let (surface, pressing) = (&model.surface, &model.pressing);
-        let separated = self
-            .parts
-            .apply(par, surface, pressing, &mut self.frame, clearance);
+        let (config, surface, pressing) = (&model.config, &model.surface, &model.pressing);
+        let separated = self.parts.apply(config, surface, pressing, &mut self.frame);
         for joint in &model.joints {
-            joint.apply(&mut self.frame.vertices, clearance);
+            joint.apply(config, &mut self.frame.vertices);
         }
         separated
     }
@@ -275,11 +257,11 @@ impl CollisionBody {
         model: &CollisionModel,
         work: &mut CollisionWorkspace,
     ) -> usize {
-        let par = model.config.par;
-        model.surface.update_normals(par, &mut self.frame);
+        let (config, surface) = (&model.config, &model.surface);
+        surface.update_normals(config.par, &mut self.frame);
         let bvh = work.bvh.get_or_insert_with(|| model.bvh.clone());
         self.interior
-            .update(par, &model.surface, &model.opposite, &self.frame, bvh);
+            .update(config, surface, &model.opposite, &self.frame, bvh);
         self.interior.count()
     }
 
@@ -310,8 +292,7 @@ impl CollisionBody {
 mod tests {
     use super::super::test_shapes::two_spheres;
     use super::*;
-
-    const CLEARANCE: f32 = 0.013;
+    use tryon_geometry::par::Par;
 
     /// Two spheres of 10 cm whose parts press on each other, and their vertices at a distance of 30 cm.
     fn model(noise_deadband: f64) -> (CollisionModel, Vec<P3>, usize) {
@@ -326,8 +307,8 @@ mod tests {
         let mesh = TriMesh::new(frame.vertices.clone(), surface.faces().to_vec()).expect("a mesh");
         let config = CollisionConfig {
             noise_deadband,
-            clearance: CLEARANCE,
             par: Par::Seq,
+            ..CollisionConfig::default()
         };
         let model = CollisionModel::new(&mesh, parts, config).expect("a model");
         (model, frame.vertices, n)
@@ -355,7 +336,7 @@ mod tests {
             .expect("it fits");
         assert!(r.separated > 0 && r.interior == 0, "{r:?}");
         let gap = body.vertices()[n + 1].x - body.vertices()[0].x;
-        assert!((gap - CLEARANCE).abs() < 1e-3, "{gap} m between the poles");
+        assert!((gap - 0.013).abs() < 1e-3, "{gap} m between the poles");
         assert_eq!(body.frame().normals.len(), start.len());
     }
 

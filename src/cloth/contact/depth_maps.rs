@@ -4,6 +4,7 @@
 //! it the exact nearest point is walked to on the mesh itself, so the resolution of the maps decides how good the
 //! proposal is, never how deep cloth may sink.
 
+use crate::settings::MapSettings;
 use serde::{Deserialize, Serialize};
 use tryon_geometry::math::P3;
 use tryon_geometry::mesh::Face;
@@ -17,12 +18,11 @@ pub struct MapView {
     pub axes: [[f32; 3]; 3],
     /// Scale.
     pub pixels_per_metre: f32,
+    /// Border, metres.
+    pub border: f32,
+    /// Largest side, pixels.
+    pub largest: f32,
 }
-
-/// Scale of the side and back maps: a pixel is a body edge wide.
-const COARSE: f32 = 64.0;
-/// Scale of the map that looks from the real camera; the paper asks for a higher resolution there.
-const FINE: f32 = 128.0;
 
 /// Resolution of the depth maps: 8 mm a pixel where fine, else 16.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -40,22 +40,23 @@ pub enum MapDetail {
 impl MapView {
     /// The four level directions, starting with the one of the real camera: `toward` is the horizontal direction it
     /// looks along, in the world.
-    pub fn around(toward: [f32; 2], detail: MapDetail) -> [Self; 4] {
+    pub fn around(toward: [f32; 2], detail: MapDetail, settings: &MapSettings) -> [Self; 4] {
+        let MapSettings {
+            coarse,
+            fine,
+            border,
+            largest,
+        } = *settings;
         let n = toward[0].hypot(toward[1]);
         let (x, z) = if n > 1e-6 {
             (toward[0] / n, toward[1] / n)
         } else {
             (0.0, -1.0)
         };
-        let front = if detail == MapDetail::Nowhere {
-            COARSE
-        } else {
-            FINE
-        };
-        let others = if detail == MapDetail::Everywhere {
-            FINE
-        } else {
-            COARSE
+        let [front, others] = match detail {
+            MapDetail::InView => [fine, coarse],
+            MapDetail::Everywhere => [fine; 2],
+            MapDetail::Nowhere => [coarse; 2],
         };
         [
             (x, z, front),
@@ -67,6 +68,8 @@ impl MapView {
             // forward f, down −y, right = down × forward.
             axes: [[-fz, 0.0, fx], [0.0, -1.0, 0.0], [fx, 0.0, fz]],
             pixels_per_metre,
+            border,
+            largest,
         })
     }
 }
@@ -93,10 +96,6 @@ fn turn(axes: &[[f32; 3]; 3], p: &P3) -> P3 {
 impl DepthMaps {
     /// Renders the body into every view, each view on its own thread when allowed.
     pub fn render(&mut self, par: Par, views: &[MapView], vertices: &[P3], faces: &[Face]) {
-        /// Empty border, metres: a garment hangs outside the silhouette.
-        const BORDER: f32 = 0.02;
-        /// No map gets larger than this on a side, pixels: a broken body must not exhaust memory.
-        const LARGEST: f32 = 1024.0;
         self.maps.resize_with(views.len(), Map::default);
         par::for_chunks(par, &mut self.maps, 1, |i, m| {
             let (m, v) = (&mut m[0], &views[i]);
@@ -108,13 +107,14 @@ impl DepthMaps {
                 |(lo, hi), p| (lo.inf(p), hi.sup(p)),
             );
             let side = |k: usize| {
-                ((hi[k] - lo[k] + 2.0 * BORDER) * v.pixels_per_metre).clamp(1.0, LARGEST) as u32
+                let metres = hi[k] - lo[k] + 2.0 * v.border;
+                (metres * v.pixels_per_metre).clamp(1.0, v.largest) as u32
             };
             let view = View::Orthographic {
                 width: side(0),
                 height: side(1),
-                left: lo.x - BORDER,
-                top: lo.y - BORDER,
+                left: lo.x - v.border,
+                top: lo.y - v.border,
                 pixels_per_metre: v.pixels_per_metre,
             };
             rasterise_with(
@@ -172,7 +172,7 @@ mod tests {
         let mut maps = DepthMaps::default();
         maps.render(
             Par::Seq,
-            &MapView::around([0.0, -1.0], MapDetail::InView),
+            &MapView::around([0.0, -1.0], MapDetail::InView, &MapSettings::default()),
             &v,
             &f,
         );
@@ -208,7 +208,8 @@ mod tests {
             }
         }
         let mut maps = DepthMaps::default();
-        maps.render(Par::Seq, &MapView::around([0.0, -1.0], detail), &v, &f);
+        let views = MapView::around([0.0, -1.0], detail, &MapSettings::default());
+        maps.render(Par::Seq, &views, &v, &f);
         let mut out = [[0.0f32; 2]; 2];
         let mut counts = [0; 2];
         for k in 10..rings - 10 {
@@ -244,8 +245,9 @@ mod tests {
         }
         // In view (flanks too): within a millimetre of fine maps everywhere. Elsewhere: within a coarse pixel of the nearest.
         assert!(view[0][0] < all[0][0] + 1e-3, "{view:?} {all:?}");
+        let coarse = MapSettings::default().coarse;
         assert!(
-            view[1][1] < 1.0 / COARSE && none[0][1] < 1.0 / COARSE,
+            view[1][1] < 1.0 / coarse && none[0][1] < 1.0 / coarse,
             "{view:?} {none:?}"
         );
         // And the switch does something.

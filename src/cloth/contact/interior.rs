@@ -5,9 +5,10 @@
 
 use super::proximity_cache::{PartQuery, ProximityCache};
 use super::{ClosestPoint, Part, SurfaceFrame, SurfaceModel};
+use crate::settings::CollisionConfig;
 use serde::{Deserialize, Serialize};
 use tryon_geometry::math::P3;
-use tryon_geometry::par::{self, Par};
+use tryon_geometry::par;
 use tryon_geometry::spatial::Bvh;
 
 /// Mask of the vertices inside another part, and the queries behind it.
@@ -29,11 +30,6 @@ enum SurfaceSide {
     Unknown,
 }
 
-/// Rings by which the mask grows into skin of unknown side: 4 cm of the embedded body. A heavy one needs three.
-const RINGS: usize = 8;
-/// Distance off the skin at which the winding number is taken, metres: less than a fabric's thickness, above rounding.
-const OFF_SKIN: f32 = 1e-3;
-
 /// Inside test for a closed surface that may pass through itself, by ray parity with sign.
 struct InsideTest<'a> {
     bvh: &'a Bvh,
@@ -52,7 +48,7 @@ impl Interior {
     /// `bvh` holds the faces of `model`.
     pub(super) fn update(
         &mut self,
-        par: Par,
+        config: &CollisionConfig,
         model: &SurfaceModel,
         opposite: &[Part],
         frame: &SurfaceFrame,
@@ -65,15 +61,22 @@ impl Interior {
             others: opposite,
             reach: 0.0,
         };
-        self.sides
-            .update(par, &query, |v, near, hit| classify(&query, v, near, hit));
-        self.confirm(par, model, frame, bvh);
+        self.sides.update(config.par, &query, |v, near, hit| {
+            classify(&query, v, near, hit)
+        });
+        self.confirm(config, model, frame, bvh);
     }
 
     /// Confirms suspects by their winding number and grows the mask into skin of unknown side.
     ///
     /// The nearest point alone is not enough: where an arm ends, its nearest skin faces away from the shoulder blade.
-    fn confirm(&mut self, par: Par, model: &SurfaceModel, frame: &SurfaceFrame, bvh: &mut Bvh) {
+    fn confirm(
+        &mut self,
+        config: &CollisionConfig,
+        model: &SurfaceModel,
+        frame: &SurfaceFrame,
+        bvh: &mut Bvh,
+    ) {
         let entries = &mut self.sides.entries;
         self.inside
             .iter_mut()
@@ -88,9 +91,9 @@ impl Interior {
             bvh,
             vertices: &frame.vertices,
         };
-        let is_inside =
-            |v: usize| body.contains(&(frame.vertices[v] + frame.normals[v] * OFF_SKIN));
-        par::for_chunks(par, entries, 256, |start, chunk| {
+        let off = config.off_skin;
+        let is_inside = |v: usize| body.contains(&(frame.vertices[v] + frame.normals[v] * off));
+        par::for_chunks(config.par, entries, 256, |start, chunk| {
             for (k, e) in chunk.iter_mut().enumerate() {
                 if e.result == SurfaceSide::Suspect {
                     let inside = is_inside(start + k);
@@ -107,7 +110,7 @@ impl Interior {
             .collect();
         ring.iter().for_each(|v| self.inside[*v as usize] = true);
         let mut tested = self.inside.clone();
-        for _ in 0..RINGS {
+        for _ in 0..config.interior_rings {
             let mut next = Vec::new();
             for &w in ring.iter().flat_map(|v| model.neighbours(*v)) {
                 let v = w as usize;
@@ -169,6 +172,14 @@ mod tests {
     use super::super::test_shapes::{sphere, surface, two_spheres};
     use super::*;
     use tryon_geometry::math::V3;
+    use tryon_geometry::par::Par;
+
+    fn config() -> CollisionConfig {
+        CollisionConfig {
+            par: Par::Seq,
+            ..CollisionConfig::default()
+        }
+    }
 
     #[test]
     fn two_halves_of_one_sphere_are_not_inside_each_other() {
@@ -180,7 +191,7 @@ mod tests {
         let (model, frame) = surface(&mesh, parts);
         let mut interior = Interior::default();
         let mut bvh = Bvh::new(model.faces(), &frame.vertices);
-        interior.update(Par::Seq, &model, &opposite, &frame, &mut bvh);
+        interior.update(&config(), &model, &opposite, &frame, &mut bvh);
         assert_eq!(interior.count(), 0);
     }
 
@@ -196,7 +207,7 @@ mod tests {
             let second = frame.vertices[n..].iter_mut();
             second.for_each(|p| *p += V3::x() * (d - 3.0));
             model.update_normals(Par::Seq, &mut frame);
-            interior.update(Par::Seq, &model, &opposite, &frame, &mut bvh);
+            interior.update(&config(), &model, &opposite, &frame, &mut bvh);
             let mut undecided = 0;
             for (i, p) in frame.vertices.iter().enumerate() {
                 let other = P3::new(if i < n { d } else { 0.0 }, 0.0, 0.0);

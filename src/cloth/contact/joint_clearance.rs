@@ -4,6 +4,7 @@
 //! are compared slice by slice in front of the joint, as [`part_clearance`](super::part_clearance) compares parts.
 
 use super::SurfaceModel;
+use crate::settings::{CollisionConfig, JointClearanceSettings};
 use tryon_geometry::math::{P3, V3};
 
 /// A hinge joint between two segments of a limb.
@@ -15,15 +16,8 @@ pub(super) struct JointClearance {
     ring: Vec<u32>,
 }
 
-/// Cosines of the angle between segments where separation begins, 110°, and where it is full, 80°.
-const BENT: [f32; 2] = [-0.34, 0.17];
-/// Distance in front of the joint from which on separation is full, metres.
-const FRONT: f32 = 0.03;
-/// Thickness of a slice, metres, and number of slices.
-const SLICE: f32 = 0.02;
+/// Number of slices.
 const SLICES: usize = 12;
-/// Clearance of segments that just touch, metres; penetrating ones get all, as cloth there lies in the skin by half of it.
-const TOUCHING: f32 = 0.007;
 /// Sides of the bisecting plane on which the upper and the lower segment lie.
 const SIDES: [f32; 2] = [-1.0, 1.0];
 
@@ -36,13 +30,15 @@ struct Bend {
     across: V3,
     /// Share of the separation at this angle.
     share: f32,
+    /// Thickness of a slice, metres.
+    slice: f32,
 }
 
 impl Bend {
     /// Slices in front of the joint, and distance towards the lower segment, metres.
     fn coordinates(&self, p: &P3) -> (f32, f32) {
         let d = p.coords - self.joint;
-        (d.dot(&self.front) / SLICE, d.dot(&self.across))
+        (d.dot(&self.front) / self.slice, d.dot(&self.across))
     }
 }
 
@@ -77,21 +73,26 @@ impl JointClearance {
         })
     }
 
-    /// Displaces vertices until `clearance` metres are left between the segments, half of what is missing on either
-    /// side. Any frame, metres.
-    pub(super) fn apply(&self, body: &mut [P3], clearance: f32) {
-        let Some(bend) = self.bend(body) else { return };
+    /// Displaces vertices until the clearance is left between the segments, half of what is missing on either side. Any
+    /// frame, metres.
+    pub(super) fn apply(&self, config: &CollisionConfig, body: &mut [P3]) {
+        let settings = &config.joints;
+        let Some(bend) = self.bend(settings, body) else {
+            return;
+        };
         let extents = [self.extent(body, &bend, 0), self.extent(body, &bend, 1)];
         for (segment, side) in self.segments.iter().zip(SIDES) {
             for p in segment.iter().map(|v| *v as usize) {
                 let (slice, across) = bend.coordinates(&body[p]);
-                let share = bend.share * (slice * SLICE / FRONT).clamp(0.0, 1.0);
+                let share = bend.share * (slice * settings.slice / settings.front).clamp(0.0, 1.0);
                 let (true, Some(upper), Some(lower)) =
                     (share > 0.0, extents[0].at(slice), extents[1].at(slice))
                 else {
                     continue;
                 };
-                let wanted = clearance.min(TOUCHING + (upper + lower).max(0.0));
+                let wanted = config
+                    .clearance
+                    .min(settings.touching + (upper + lower).max(0.0));
                 let missing = wanted + upper + lower;
                 let own = if side < 0.0 { upper } else { lower };
                 let beyond = -side * across - (own - 0.5 * missing);
@@ -103,7 +104,7 @@ impl JointClearance {
     }
 
     /// `None` for a joint that is straight or has no direction.
-    fn bend(&self, body: &[P3]) -> Option<Bend> {
+    fn bend(&self, settings: &JointClearanceSettings, body: &[P3]) -> Option<Bend> {
         let centre = |of: &[u32]| {
             let at = of.iter().map(|v| body[*v as usize].coords);
             at.fold(V3::zeros(), |s, p| s + p) / of.len().max(1) as f32
@@ -114,7 +115,8 @@ impl JointClearance {
             .each_ref()
             .map(|segment| (centre(segment) - joint).try_normalize(0.0));
         let (upper, lower) = (upper?, lower?);
-        let share = ((upper.dot(&lower) - BENT[0]) / (BENT[1] - BENT[0])).clamp(0.0, 1.0);
+        let [begin, full] = settings.bent;
+        let share = ((upper.dot(&lower) - begin) / (full - begin)).clamp(0.0, 1.0);
         let (front, across) = (
             (upper + lower).try_normalize(0.0)?,
             (lower - upper).try_normalize(0.0)?,
@@ -124,6 +126,7 @@ impl JointClearance {
             front,
             across,
             share,
+            slice: settings.slice,
         })
     }
 
@@ -183,7 +186,8 @@ mod tests {
     }
     /// Least distance of the segments across the crook, in front of the joint, metres.
     fn gap(joint: &JointClearance, body: &[P3]) -> f32 {
-        let bend = joint.bend(body).expect("bent");
+        let settings = JointClearanceSettings::default();
+        let bend = joint.bend(&settings, body).expect("bent");
         let at = |v: &u32| {
             (
                 body[*v as usize].coords - bend.joint,
@@ -193,8 +197,9 @@ mod tests {
         let mut least = f32::INFINITY;
         for (a, (slice, upper)) in joint.segments[0].iter().map(at) {
             for (b, (other, lower)) in joint.segments[1].iter().map(at) {
-                let front = FRONT / SLICE;
-                let beside = (slice - other).abs() * SLICE < 0.005 && (a.z - b.z).abs() < 0.005;
+                let front = settings.front / settings.slice;
+                let beside =
+                    (slice - other).abs() * settings.slice < 0.005 && (a.z - b.z).abs() < 0.005;
                 if beside && slice > front && other > front {
                     least = least.min(lower - upper);
                 }
@@ -205,18 +210,18 @@ mod tests {
 
     #[test]
     fn folded_arm_gets_clearance_in_the_crook_only_in_any_frame() {
-        const CLEARANCE: f32 = 0.013;
+        let config = CollisionConfig::default();
         for angle in [1.9, 2.2, 2.5f32] {
             let (before, joint) = arm(angle);
             let mut body = before.clone();
-            joint.apply(&mut body, CLEARANCE);
+            joint.apply(&config, &mut body);
             let (was, is) = (gap(&joint, &before), gap(&joint, &body));
             assert!(was < 0.0, "bent by {angle} it lies in itself: {was}");
             assert!(
-                is > 0.99 * TOUCHING && is < CLEARANCE,
+                is > 0.99 * config.joints.touching && is < config.clearance,
                 "bent by {angle}: {is} m"
             );
-            let bend = joint.bend(&before).expect("bent");
+            let bend = joint.bend(&config.joints, &before).expect("bent");
             let moved = |v: &usize| before[*v] != body[*v];
             assert!(
                 (0..body.len())
@@ -233,7 +238,7 @@ mod tests {
                 )
             };
             let mut turned: Vec<P3> = before.iter().map(moved_to).collect();
-            joint.apply(&mut turned, CLEARANCE);
+            joint.apply(&config, &mut turned);
             assert!(
                 turned
                     .iter()
@@ -248,13 +253,13 @@ mod tests {
         for angle in [0.0, 0.6, 1.1f32] {
             let (before, joint) = arm(angle);
             let mut body = before.clone();
-            joint.apply(&mut body, 0.013);
+            joint.apply(&CollisionConfig::default(), &mut body);
             assert_eq!(body, before, "{angle}");
         }
         // Degenerate: all vertices in one point.
         let (before, joint) = arm(2.0);
         let mut body = vec![P3::origin(); before.len()];
-        joint.apply(&mut body, 0.013);
+        joint.apply(&CollisionConfig::default(), &mut body);
         assert!(body.iter().all(|p| *p == P3::origin()));
     }
 }

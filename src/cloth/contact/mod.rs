@@ -24,10 +24,13 @@ mod surface;
 mod test_shapes;
 mod triangle_fan;
 
+pub use crate::settings::{
+    CollisionConfig, JointClearanceSettings, MapSettings, PartClearanceSettings, SurfaceSettings,
+};
 pub use closest_point::{ClosestPoint, SearchExtent};
 pub use collision_body::{
-    CollisionBody, CollisionConfig, CollisionError, CollisionModel, CollisionParts,
-    CollisionReport, CollisionWorkspace,
+    CollisionBody, CollisionError, CollisionModel, CollisionParts, CollisionReport,
+    CollisionWorkspace,
 };
 pub use contact_mesh::{ContactMesh, ContactMeshError, ContactSurface};
 pub use depth_maps::{DepthMaps, MapDetail, MapView};
@@ -40,8 +43,7 @@ pub(crate) use edge_triangle::edge_meets_triangle;
 pub use interior::Interior;
 pub use pair::{ActivePair, ContactPair};
 pub use potential::{
-    Barrier, BarrierSample, BarrierScale, ContactAssembly, ContactElement, Curvature, Friction,
-    FrictionPair,
+    Barrier, BarrierSample, ContactAssembly, ContactElement, Curvature, Friction, FrictionPair,
 };
 pub use skin_grid::{SkinCandidates, SkinGrid};
 pub use surface::{Part, SurfaceFrame, SurfaceModel};

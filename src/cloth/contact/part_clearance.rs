@@ -5,33 +5,26 @@
 
 use super::proximity_cache::{PartQuery, ProximityCache};
 use super::{Part, SurfaceFrame, SurfaceModel};
+use crate::settings::{CollisionConfig, PartClearanceSettings};
 use serde::{Deserialize, Serialize};
 use tryon_geometry::math::V3;
 use tryon_geometry::mesh::smoothing::mean;
-use tryon_geometry::par::Par;
 
 /// Separating displacement of each vertex and the queries behind it.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(super) struct PartClearance(ProximityCache<V3>);
 
-/// Largest displacement, metres: deeper, the nearest skin no longer tells inside from outside.
-const MAX_DISPLACEMENT: f32 = 0.035;
-/// Displacement of smoothed neighbours beyond their own, metres: cloth on them lies no deeper than that.
-const MAX_EXTRA: f32 = 0.005;
-/// Smoothing iterations over neighbours, and rings of neighbours that follow; fewer leave a step in the skin.
-const SMOOTHING: usize = 3;
-
 impl PartClearance {
-    /// Displaces vertices with less than `clearance` metres to another part, and empties the normals of `frame`.
+    /// Displaces vertices with less than the clearance to another part, and empties the normals of `frame`.
     /// `pressing`: the part that presses on each vertex, 0 for none. Returns the number of separated vertices.
     pub(super) fn apply(
         &mut self,
-        par: Par,
+        config: &CollisionConfig,
         model: &SurfaceModel,
         pressing: &[Part],
         frame: &mut SurfaceFrame,
-        clearance: f32,
     ) -> usize {
+        let (clearance, most) = (config.clearance, config.parts.max_displacement);
         // Few normals are needed: each is computed on demand.
         frame.normals.clear();
         let still = &*frame;
@@ -41,32 +34,37 @@ impl PartClearance {
             others: pressing,
             reach: clearance,
         };
-        self.0.update(par, &query, |v, near, hit| match hit {
+        self.0.update(config.par, &query, |v, near, hit| match hit {
             Ok(c)
                 if !c.on_part_boundary
                     && pressing[near as usize] != 0
                     && c.signed_distance < clearance
                     && c.normal.dot(&model.normal(still, v as u32)) < 0.0 =>
             {
-                c.normal * (0.5 * (clearance - c.signed_distance)).min(MAX_DISPLACEMENT)
+                c.normal * (0.5 * (clearance - c.signed_distance)).min(most)
             }
             _ => V3::zeros(),
         });
         let moves = |v: &u32| self.0.entries[*v as usize].result != V3::zeros();
         let separated: Vec<u32> = (0..frame.vertices.len() as u32).filter(moves).collect();
-        for (v, displacement) in self.smoothed(model, &separated) {
+        for (v, displacement) in self.smoothed(&config.parts, model, &separated) {
             frame.vertices[v as usize] += displacement;
         }
         separated.len()
     }
 
     /// Displacements of the separated vertices, which keep their own, and of the rings around them.
-    fn smoothed(&self, model: &SurfaceModel, separated: &[u32]) -> Vec<(u32, V3)> {
+    fn smoothed(
+        &self,
+        settings: &PartClearanceSettings,
+        model: &SurfaceModel,
+        separated: &[u32],
+    ) -> Vec<(u32, V3)> {
         let mut is_near = vec![false; self.0.entries.len()];
         let mut near = separated.to_vec();
         near.iter().for_each(|v| is_near[*v as usize] = true);
         let mut last = 0;
-        for _ in 0..SMOOTHING {
+        for _ in 0..settings.smoothing {
             let ring = last..near.len();
             last = near.len();
             for k in ring {
@@ -79,14 +77,14 @@ impl PartClearance {
         }
         let mut all: Vec<V3> = self.0.entries.iter().map(|e| e.result).collect();
         let mut next = vec![V3::zeros(); near.len()];
-        for _ in 0..SMOOTHING {
+        for _ in 0..settings.smoothing {
             for (to, &v) in next.iter_mut().zip(&near) {
                 let around = model.neighbours(v).iter().map(|w| &all[*w as usize]);
                 let Some(mean) = mean(std::iter::once(&all[v as usize]).chain(around)) else {
                     continue;
                 };
                 let own = self.0.entries[v as usize].result;
-                let (most, length) = (own.norm() + MAX_EXTRA, mean.norm());
+                let (most, length) = (own.norm() + settings.max_extra, mean.norm());
                 *to = if length <= own.norm() {
                     own
                 } else {
@@ -106,8 +104,14 @@ mod tests {
     use super::super::test_shapes::two_spheres;
     use super::*;
     use tryon_geometry::math::P3;
+    use tryon_geometry::par::Par;
 
-    const CLEARANCE: f32 = 0.013;
+    fn config(par: Par) -> CollisionConfig {
+        CollisionConfig {
+            par,
+            ..CollisionConfig::default()
+        }
+    }
 
     /// Two spheres of radius 1, their centres `d` apart.
     fn two(d: f32) -> (SurfaceModel, SurfaceFrame, Vec<Part>, usize) {
@@ -123,15 +127,15 @@ mod tests {
             let (model, mut frame, pressing, n) = two(d);
             let before = frame.vertices.clone();
             let mut parts = PartClearance::default();
-            let count = parts.apply(Par::Seq, &model, &pressing, &mut frame, CLEARANCE);
+            let count = parts.apply(&config(Par::Seq), &model, &pressing, &mut frame);
             assert!(count > 0 && count < n / 4, "{count}");
             // The poles face each other: each moves by half of what is missing.
             let gap = frame.vertices[n + 1].x - frame.vertices[0].x;
-            assert!((gap - CLEARANCE).abs() < 1e-3, "{gap} m between the poles");
+            assert!((gap - 0.013).abs() < 1e-3, "{gap} m between the poles");
             for (i, (a, b)) in before.iter().zip(&frame.vertices).enumerate() {
                 let other = P3::new(if i < n { d } else { 0.0 }, 0.0, 0.0);
                 let moved = (a - b).norm();
-                assert!(moved <= MAX_DISPLACEMENT + 1e-6);
+                assert!(moved <= 0.035 + 1e-6);
                 // Three smoothing iterations reach three edges (6 cm each) further.
                 assert!(
                     moved < 1e-6 || (a - other).norm() < 1.0 + 0.2,
@@ -143,7 +147,7 @@ mod tests {
         let before = frame.vertices.clone();
         let mut parts = PartClearance::default();
         assert_eq!(
-            parts.apply(Par::Seq, &model, &pressing, &mut frame, CLEARANCE),
+            parts.apply(&config(Par::Seq), &model, &pressing, &mut frame),
             0
         );
         assert_eq!(frame.vertices, before);
@@ -155,8 +159,8 @@ mod tests {
         for d in [2.1, 2.0, 1.97, 2.004, 2.2] {
             let (model, mut frame, pressing, _) = two(d);
             let mut anew = SurfaceFrame::without_normals(frame.vertices.clone());
-            incremental.apply(Par::Seq, &model, &pressing, &mut frame, CLEARANCE);
-            PartClearance::default().apply(Par::Rayon, &model, &pressing, &mut anew, CLEARANCE);
+            incremental.apply(&config(Par::Seq), &model, &pressing, &mut frame);
+            PartClearance::default().apply(&config(Par::Rayon), &model, &pressing, &mut anew);
             let pairs = frame.vertices.iter().zip(&anew.vertices);
             let off = pairs.map(|(a, b)| (a - b).norm()).fold(0.0, f32::max);
             assert!(off < 1e-6, "{d}: {off} m");
@@ -170,7 +174,7 @@ mod tests {
         let before = frame.vertices.clone();
         let mut parts = PartClearance::default();
         assert_eq!(
-            parts.apply(Par::Seq, &model, &pressing, &mut frame, CLEARANCE),
+            parts.apply(&config(Par::Seq), &model, &pressing, &mut frame),
             0
         );
         assert_eq!(frame.vertices, before);

@@ -3,13 +3,9 @@
 //! In the crook of an elbow, or between toes, a walk ends on skin that is near but is not the skin below the cloth.
 
 use super::{ClosestPoint, Part, SurfaceFrame, SurfaceModel};
+use crate::settings::SurfaceSettings;
 use tryon_geometry::math::P3;
 use tryon_geometry::spatial::HashGrid;
-
-/// Radius of the nearest-vertex query, metres: a vertex spacing of the body. With 25 mm a hood crumples on a slim neck.
-const NEAREST: f32 = 0.015;
-/// Radius for vertices that the point is below, metres: with less, cloth between passing knees got 15 mm deep in a step.
-const BELOW: f32 = 0.025;
 
 /// Hash grid of the vertices of a surface.
 #[derive(Clone, Debug, Default)]
@@ -19,8 +15,9 @@ pub struct SkinGrid {
 
 impl SkinGrid {
     /// Rebuilds the grid for a frame.
-    pub fn fill(&mut self, frame: &SurfaceFrame) {
-        self.grid.fill(&frame.vertices, 2.0 * BELOW);
+    pub fn fill(&mut self, surface: &SurfaceModel, frame: &SurfaceFrame) {
+        self.grid
+            .fill(&frame.vertices, 2.0 * surface.settings.below);
     }
     /// Candidate vertices near `x`, for two masks of parts.
     pub fn candidates(
@@ -30,8 +27,9 @@ impl SkinGrid {
         x: &P3,
         masks: [Part; 2],
     ) -> [SkinCandidates; 2] {
-        let mut found = [[(NEAREST * NEAREST, None), (BELOW * BELOW, None)]; 2];
-        self.grid.within(x, BELOW, |v, d| {
+        let SurfaceSettings { nearest, below, .. } = surface.settings;
+        let mut found = [[(nearest * nearest, None), (below * below, None)]; 2];
+        self.grid.within(x, below, |v, d| {
             let part = surface.part(v);
             for ([any, above], mask) in found.iter_mut().zip(masks) {
                 if part & mask == 0 {
@@ -102,7 +100,7 @@ mod tests {
         let (surface, frame, n) = two_spheres(3, 0.01, [-0.011, 0.011], [1, 1]);
         let n = n as u32;
         let mut near = SkinGrid::default();
-        near.fill(&frame);
+        near.fill(&surface, &frame);
         // 2 mm under the right one, found from the left one.
         let x = P3::new(0.003, 0.0, 0.0);
         let walked = surface.closest(&frame, &x, 0, 1);
@@ -150,7 +148,7 @@ mod tests {
     fn point_above_a_limb_is_near_and_not_below() {
         let (surface, frame, _) = two_spheres(4, 0.1, [-0.15, 0.15], [1, 1]);
         let mut near = SkinGrid::default();
-        near.fill(&frame);
+        near.fill(&surface, &frame);
         for (height, seen, under) in [
             (0.05, false, false),
             (0.005, true, false),
@@ -186,7 +184,7 @@ mod tests {
         let side = frame.normals[n as usize].x.signum();
         let x = P3::new(0.011 - 0.002 * side, 0.0, 0.0);
         let mut near = SkinGrid::default();
-        near.fill(&frame);
+        near.fill(&surface, &frame);
         let [own, _] = near.candidates(&surface, &frame, &x, [1, 0]);
         assert!(
             own.0[0].is_some_and(|v| v < n) && own.0[1].is_some_and(|v| v >= n),

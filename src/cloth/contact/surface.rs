@@ -1,5 +1,6 @@
 //! A triangle surface whose vertices move while its topology and parts stay.
 
+use crate::settings::SurfaceSettings;
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, BTreeSet};
 use tryon_geometry::math::{P3, V3};
@@ -20,6 +21,7 @@ pub struct SurfaceModel {
     pub(super) border: Vec<bool>,
     /// Parts common to all corners of the faces around each vertex.
     pub(super) common: Vec<Part>,
+    pub(super) settings: SurfaceSettings,
 }
 
 /// Vertices and normals of a surface at one time.
@@ -60,6 +62,7 @@ impl SurfaceModel {
             faces,
             topology,
             parts,
+            settings: SurfaceSettings::default(),
         }
     }
     /// Number of vertices.

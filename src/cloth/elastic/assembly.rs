@@ -22,8 +22,7 @@ pub struct ElasticExpansion {
 /// Expansions of the single elements.
 #[derive(Clone, Debug, Default)]
 pub(super) struct ElementBuffers {
-    pub(super) membranes: Vec<Packed<3, 6>>,
-    pub(super) hinges: Vec<Packed<4, 10>>,
+    pub(super) membranes: Vec<Packed>,
     pub(super) curvatures: CurvatureBuffers,
 }
 

@@ -1,15 +1,15 @@
-//! Dihedral angle of two triangles on an edge, with both derivatives.
+//! Dihedral angle of two triangles on an edge, with its derivative.
 //!
 //! With the edge e = x₁ − x₀, the wings a = x₂ − x₀ and b = x₃ − x₀ and their normals m = e × a, n = b × e, the angle is
 //! atan2(ê · (m × n), m · n): zero when flat, positive when the wings fold away from their normals.
 //! ∂θ/∂a = −|e| m/|m|² and ∂θ/∂b = −|e| n/|n|²; moving e turns both wings, by the fractions α = a·e/|e|² and β = b·e/|e|²
 //! of what moving the apices does: ∂θ/∂e = −α ∂θ/∂a − β ∂θ/∂b.
 
-use nalgebra::{Matrix3, SMatrix, SVector};
+use nalgebra::SVector;
 use std::f64::consts::{FRAC_PI_2, TAU};
-use tryon_geometry::math::{V3d, skew};
+use tryon_geometry::math::V3d;
 
-/// Angle of a hinge with its derivatives by the stacked corners (edge start, edge end, left apex, right apex).
+/// Angle of a hinge with its derivative by the stacked corners (edge start, edge end, left apex, right apex).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Dihedral {
     /// Angle (rad) in (−π, π], beyond where it is a continued one.
@@ -135,67 +135,17 @@ impl Dihedral {
             gradient,
         }
     }
-    /// Second derivative of the angle (rad/m²), symmetric.
-    pub fn hessian(x: &[V3d; 4]) -> SMatrix<f64, 12, 12> {
-        let w = Wings::new(x);
-        // Rows and columns (e, a, b); a and b do not meet.
-        let mut inner = SMatrix::<f64, 9, 9>::zeros();
-        let (by_arms, fractions) = (w.by_arms(), w.fractions());
-        let mut by_edge = Matrix3::zeros();
-        for k in 0..2 {
-            let (by_e, by_arm) = w.arm_derivatives(k);
-            // ∂(α gₐ)/∂e, with ∂α/∂e = (a − 2 α e)/|e|².
-            let slope = (w.arms[k] - w.e * (2.0 * fractions[k])) / w.length.powi(2);
-            by_edge -= by_arms[k] * slope.transpose() + by_e * fractions[k];
-            let at = 3 * (k + 1);
-            inner.fixed_view_mut::<3, 3>(at, at).copy_from(&by_arm);
-            inner.fixed_view_mut::<3, 3>(at, 0).copy_from(&by_e);
-            inner
-                .fixed_view_mut::<3, 3>(0, at)
-                .copy_from(&by_e.transpose());
-        }
-        inner.fixed_view_mut::<3, 3>(0, 0).copy_from(&by_edge);
-        by_corners(&((inner + inner.transpose()) * 0.5))
-    }
-}
-
-impl Wings {
-    /// Derivatives of ∂θ/∂arm by the edge and by the arm.
-    fn arm_derivatives(&self, k: usize) -> (Matrix3<f64>, Matrix3<f64>) {
-        let (n, q) = (self.normals[k], self.squared[k]);
-        // Normal e × a or b × e: its derivative by the edge and by the arm.
-        let sign = [1.0, -1.0][k];
-        let (by_e, by_arm) = (skew(&self.arms[k]) * -sign, skew(&self.e) * sign);
-        // d(n/|n|²) = (I − 2 n nᵀ/|n|²) dn/|n|².
-        let inverse = (Matrix3::identity() - n * n.transpose() * (2.0 / q)) * (-self.length / q);
-        let stretch = n * self.e.transpose() * (-1.0 / (q * self.length));
-        (inverse * by_e + stretch, inverse * by_arm)
-    }
-}
-
-/// Second derivative by the four corners of one by (e, a, b).
-fn by_corners(inner: &SMatrix<f64, 9, 9>) -> SMatrix<f64, 12, 12> {
-    let mut map = SMatrix::<f64, 9, 12>::zeros();
-    for k in 0..9 {
-        map[(k, k % 3)] = -1.0;
-        map[(k, k + 3)] = 1.0;
-    }
-    map.tr_mul(inner) * map
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use nalgebra::DMatrix;
     use tryon_geometry::math::derivative_check::{DerivativeCheck, Derivatives};
 
     /// Folded through itself, an angle goes on beyond π instead of turning into its opposite.
     #[test]
     fn angles_continue_through_a_flat_fold() {
-        let corners = |angle: f64| -> [V3d; 4] {
-            let x = bent(angle);
-            [0, 1, 2, 3].map(|k| V3d::from_column_slice(&x[3 * k..3 * k + 3]))
-        };
+        let corners = |angle: f64| corners(&bent(angle));
         let base = Dihedral::angle(&corners(3.0));
         for side in [1.0, -1.0] {
             let start = corners(side * 3.0);
@@ -245,9 +195,7 @@ mod tests {
         let evaluate = |x: &[f64], weight: f64| {
             let d = Dihedral::new(&corners(x));
             let gradient = (d.gradient * weight).as_slice().to_vec();
-            let h = Dihedral::hessian(&corners(x)) * weight;
             Derivatives::energy(d.angle * weight, gradient)
-                .with_hessian(DMatrix::from_column_slice(12, 12, h.as_slice()))
         };
         let check = DerivativeCheck::default();
         check.run(&[-2.9, -1.0, -1e-3, 0.0, 0.4, 1.5, 3.0].map(bent), evaluate);

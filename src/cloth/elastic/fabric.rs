@@ -3,6 +3,7 @@
 use super::measured_bend::MeasuredBend;
 use super::measured_stretch::MeasuredStretch;
 use super::{BendLaw, ElasticError, StretchLaw};
+use crate::settings::ElasticSettings;
 use tryon_formats::fabric_json::MeasuredFabric;
 
 /// Constitutive laws and mass of a sheet, u along the weft and v along the warp.
@@ -19,10 +20,11 @@ pub struct ElasticFabric {
 impl ElasticFabric {
     /// Fabric measured as by Wang, O'Brien & Ramamoorthi 2011.
     pub fn measured(fabric: &MeasuredFabric) -> Self {
+        let settings = ElasticSettings::default();
         Self {
             area_density: fabric.density,
-            stretch: StretchLaw::Measured(Box::new(MeasuredStretch::new(fabric))),
-            bend: BendLaw::Measured(Box::new(MeasuredBend::new(fabric))),
+            stretch: StretchLaw::Measured(Box::new(MeasuredStretch::new(fabric, &settings))),
+            bend: BendLaw::Measured(Box::new(MeasuredBend::new(fabric, &settings))),
         }
     }
     /// Checks that all numbers are possible for a sheet.

@@ -7,6 +7,7 @@
 
 use super::Jet;
 use super::jet::Smooth;
+use crate::settings::ElasticSettings;
 use nalgebra::{Matrix3, Vector3};
 use tryon_formats::fabric_json::MeasuredFabric;
 
@@ -14,12 +15,6 @@ use tryon_formats::fabric_json::MeasuredFabric;
 const SPACING: f64 = 10.0;
 /// Curvatures of the data.
 const CURVATURES: usize = 5;
-/// Least rigidity (N·m), far below any fabric's.
-const LEAST: f64 = 1e-8;
-/// Least twist stiffness over the rigidity about 45°, half of an isotropic sheet's.
-const LEAST_TWIST: f64 = 0.25;
-/// Largest coupling over the geometric mean of the rigidities; from 1 on a saddle yields energy.
-const LARGEST_COUPLING: f64 = 0.9;
 
 /// Bending law of a measured fabric.
 #[derive(Clone, Debug, PartialEq)]
@@ -30,12 +25,13 @@ pub struct MeasuredBend {
 
 impl MeasuredBend {
     /// Law of a fabric.
-    pub fn new(fabric: &MeasuredFabric) -> Self {
+    pub fn new(fabric: &MeasuredFabric, settings: &ElasticSettings) -> Self {
         let at = |row: usize, k: usize| {
             let entry = fabric.bending.get(row).and_then(|r| r.get(k));
-            entry.copied().unwrap_or(0.0).max(LEAST)
+            entry.copied().unwrap_or(0.0).max(settings.least_bend)
         };
-        let d: [_; CURVATURES] = std::array::from_fn(|k| orthotropic(at(2, k), at(0, k), at(1, k)));
+        let d: [_; CURVATURES] =
+            std::array::from_fn(|k| orthotropic([2, 0, 1].map(|row| at(row, k)), settings));
         let mut integral = Matrix3::zeros();
         let pieces = std::array::from_fn(|k| {
             let from = k as f64 * SPACING;
@@ -75,9 +71,9 @@ impl MeasuredBend {
 }
 
 /// Stiffness (N·m) of an orthotropic sheet with these rigidities when it curves along u, along v and along the bias.
-fn orthotropic(u: f64, v: f64, bias: f64) -> Matrix3<f64> {
-    let twist = (bias - 0.25 * (u + v)).max(LEAST_TWIST * bias);
-    let most = LARGEST_COUPLING * (u * v).sqrt();
+fn orthotropic([u, v, bias]: [f64; 3], settings: &ElasticSettings) -> Matrix3<f64> {
+    let twist = (bias - 0.25 * (u + v)).max(settings.least_twist * bias);
+    let most = settings.largest_coupling * (u * v).sqrt();
     let coupling = (2.0 * (bias - twist) - 0.5 * (u + v)).clamp(-most, most);
     Matrix3::new(u, coupling, 0.0, coupling, v, 0.0, 0.0, 0.0, twist)
 }
@@ -110,7 +106,7 @@ mod tests {
 
     #[test]
     fn derivatives_agree_with_differences() {
-        let law = MeasuredBend::new(&fabric());
+        let law = MeasuredBend::new(&fabric(), &ElasticSettings::default());
         let evaluate = |x: &[f64], weight: f64| {
             let w = law.expand(&Vector3::from_column_slice(x)) * weight;
             Derivatives::energy(w.value, w.gradient.as_slice().to_vec())
@@ -124,7 +120,7 @@ mod tests {
 
     /// Moment of bending about a measured axis over the curvature is the measured rigidity.
     fn worst_error(data: &MeasuredFabric) -> f64 {
-        let law = MeasuredBend::new(data);
+        let law = MeasuredBend::new(data, &ElasticSettings::default());
         let mut worst = 0.0f64;
         for (row, rigidities) in data.bending.iter().enumerate() {
             for (k, b) in rigidities.iter().enumerate().skip(1) {
@@ -154,7 +150,7 @@ mod tests {
 
     #[test]
     fn isotropic_data_give_an_isotropic_plate_without_coupling() {
-        let d = orthotropic(2.0, 2.0, 2.0);
+        let d = orthotropic([2.0; 3], &ElasticSettings::default());
         assert_eq!(d, Matrix3::new(2.0, 0.0, 0.0, 0.0, 2.0, 0.0, 0.0, 0.0, 1.0));
     }
 }

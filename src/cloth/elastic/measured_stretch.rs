@@ -13,19 +13,12 @@
 
 use super::Jet;
 use super::jet::Smooth;
+use crate::settings::ElasticSettings;
 use nalgebra::{Matrix3, Vector3};
 use tryon_formats::fabric_json::MeasuredFabric;
 
 /// Green–Lagrange strain of the data's stretched rows, a stretch ratio of 7/6 (spacing of the samples in ARCSim 0.2).
 const STRAIN: f64 = 0.5 * (49.0 / 36.0 - 1.0);
-/// Weight of compression against tension in the fading of s. Larger fades sooner: at a lateral contraction of 0.3 times
-/// the stretch, s falls short of the stretch by 1 %.
-const FADING: f64 = 0.5;
-/// Least stiffness of a row of the data (N/m). Fits of weak fabrics have negative eigenvalues: those would yield energy
-/// without bound.
-const LEAST: f64 = 5.0;
-/// Least stiffness at rest and between the measured angles (N/m), below that at them so that the repair stays small.
-const LEAST_ELSEWHERE: f64 = 1.0;
 /// Squared strain below which a sheet counts as unstrained.
 const UNSTRAINED: f64 = 1e-28;
 /// Angles of the stretched rows: 0°, 22.5°, 45°, 67.5°, 90° to the weft.
@@ -40,6 +33,8 @@ pub struct MeasuredStretch {
     harmonics: [Matrix3<f64>; ANGLES],
     /// Stiffness added half-way between the measured angles, none at them (N/m).
     between: f64,
+    /// Square of the fading in compression.
+    fading_squared: f64,
 }
 
 impl MeasuredStretch {
@@ -47,26 +42,25 @@ impl MeasuredStretch {
     ///
     /// Rows that are not positive definite are repaired: that of rest by less coupling, one stretched along an angle
     /// without change of its stress for a strain along that angle.
-    pub fn new(fabric: &MeasuredFabric) -> Self {
-        let at_rest = uncoupled(stiffness(fabric, 0));
+    pub fn new(fabric: &MeasuredFabric, settings: &ElasticSettings) -> Self {
+        let at_rest = uncoupled(stiffness(fabric, 0), settings);
         let stretched: [_; ANGLES] = std::array::from_fn(|k| {
             let strain = along_angle(k as f64 * std::f64::consts::PI / 8.0);
-            at_least_across(&stiffness(fabric, k + 1), &strain) - at_rest
+            at_least_across(&stiffness(fabric, k + 1), &strain, settings.least_stretch) - at_rest
         });
         let mut law = Self {
             at_rest,
             harmonics: cosine_coefficients(&stretched),
             between: 0.0,
+            fading_squared: settings.fading.powi(2),
         };
-        law.between = law.lacking_between();
+        law.between = law.lacking_between(settings);
         law
     }
     /// Stiffness (N/m) that the series lacks between the angles.
-    fn lacking_between(&self) -> f64 {
+    fn lacking_between(&self, settings: &ElasticSettings) -> f64 {
         /// Directions and radii at which the series is examined.
         const SAMPLES: usize = 64;
-        /// Share of the repair below which a direction counts as measured.
-        const MEASURED: f64 = 0.02;
         let mut lacking = 0.0f64;
         for i in 0..=SAMPLES {
             for j in 0..=SAMPLES / 8 {
@@ -74,9 +68,9 @@ impl MeasuredStretch {
                 let (b, a) = (i as f64 / SAMPLES as f64 * std::f64::consts::PI).sin_cos();
                 let h = Harmonics::new(rho * a, rho * b);
                 let k = (0..ANGLES).fold(self.at_rest, |k, m| k + self.harmonics[m] * h.cosines[m]);
-                if h.between > MEASURED {
+                if h.between > settings.measured {
                     let least = k.symmetric_eigenvalues().min();
-                    lacking = lacking.max((LEAST_ELSEWHERE - least) / h.between);
+                    lacking = lacking.max((settings.least_elsewhere - least) / h.between);
                 }
             }
         }
@@ -92,7 +86,7 @@ impl MeasuredStretch {
     }
     fn evaluate<T: Smooth>(&self, strain: &Vector3<f64>) -> T {
         let linear = T::quadratic(&self.at_rest, strain);
-        let Some(m) = Measures::<T>::new(strain) else {
+        let Some(m) = Measures::<T>::new(strain, self.fading_squared) else {
             return linear;
         };
         let h = Harmonics::<T>::new(m.along, m.across);
@@ -113,7 +107,7 @@ struct Measures<T> {
 
 impl<T: Smooth> Measures<T> {
     /// `None` without tension.
-    fn new(strain: &Vector3<f64>) -> Option<Self> {
+    fn new(strain: &Vector3<f64>, fading_squared: f64) -> Option<Self> {
         let [u, v, g] = [0, 1, 2].map(|k| T::variable(k, strain[k]));
         let (sum, difference) = (u + v, u - v);
         let radius = difference * difference + g * g;
@@ -133,7 +127,7 @@ impl<T: Smooth> Measures<T> {
         } else {
             let largest = (sum + radius.sqrt()) * 0.5;
             let pull = largest * largest;
-            let norm = (pull + (squares - pull) * FADING.powi(2)).sqrt();
+            let norm = (pull + (squares - pull) * fading_squared).sqrt();
             (pull * norm.recip(), radius)
         };
         let scale = spread.sqrt().recip();
@@ -205,28 +199,26 @@ fn along_angle(angle: f64) -> Vector3<f64> {
 }
 
 /// Positive definite matrix with coupling reduced where that suffices.
-fn uncoupled(mut m: Matrix3<f64>) -> Matrix3<f64> {
-    /// Largest coupling over the geometric mean of the stiffnesses; from 1 on the sheet is unstable.
-    const LARGEST: f64 = 0.9;
-    let most = LARGEST * (m[(0, 0)].max(0.0) * m[(1, 1)].max(0.0)).sqrt();
+fn uncoupled(mut m: Matrix3<f64>, settings: &ElasticSettings) -> Matrix3<f64> {
+    let most = settings.largest_coupling * (m[(0, 0)].max(0.0) * m[(1, 1)].max(0.0)).sqrt();
     let coupling = m[(0, 1)].clamp(-most, most);
     (m[(0, 1)], m[(1, 0)]) = (coupling, coupling);
-    at_least(&m, LEAST_ELSEWHERE)
+    at_least(&m, settings.least_elsewhere)
 }
 
-/// Matrix without eigenvalues far below [`LEAST`] with the same product with `strain`, if that product is positive work:
+/// Matrix without eigenvalues far below `least` with the same product with `strain`, if that product is positive work:
 /// its Schur complement across the strain is raised. Otherwise the nearest matrix, as [`at_least`].
-fn at_least_across(m: &Matrix3<f64>, strain: &Vector3<f64>) -> Matrix3<f64> {
+fn at_least_across(m: &Matrix3<f64>, strain: &Vector3<f64>, least: f64) -> Matrix3<f64> {
     let e = strain.normalize();
     let own = e.dot(&(m * e));
-    if own <= LEAST || m.symmetric_eigenvalues().min() >= LEAST {
-        return at_least(m, LEAST);
+    if own <= least || m.symmetric_eigenvalues().min() >= least {
+        return at_least(m, least);
     }
     let coupled = m * e;
     let rank_one = coupled * coupled.transpose() / own;
-    // m − rank_one vanishes on e; there `LEAST` is put aside so that only the complement is raised.
-    let complement = at_least(&(m - rank_one + e * e.transpose() * LEAST), LEAST);
-    rank_one + complement - e * e.transpose() * LEAST
+    // m − rank_one vanishes on e; there `least` is put aside so that only the complement is raised.
+    let complement = at_least(&(m - rank_one + e * e.transpose() * least), least);
+    rank_one + complement - e * e.transpose() * least
 }
 
 /// Coefficients of Σ aₘ cos(m θ) through values at θ = k π/4 (discrete cosine transform I).
@@ -278,7 +270,7 @@ mod tests {
 
     #[test]
     fn stress_and_tangent_are_derivatives_of_the_energy() {
-        let law = MeasuredStretch::new(&fabric());
+        let law = MeasuredStretch::new(&fabric(), &ElasticSettings::default());
         let evaluate = |x: &[f64], weight: f64| {
             let strain = Vector3::from_column_slice(x);
             let w = law.expand(&strain) * weight;
@@ -309,7 +301,7 @@ mod tests {
 
     #[test]
     fn slopes_are_continuous_where_principal_strains_meet_or_change_sign() {
-        let law = MeasuredStretch::new(&fabric());
+        let law = MeasuredStretch::new(&fabric(), &ElasticSettings::default());
         let kinks = [(0.08, 0.08), (0.08, 0.0), (0.0, -0.1), (0.0, 0.0)];
         for (first, second) in kinks {
             for angle in [0.0, 0.4, 1.2] {
@@ -330,7 +322,10 @@ mod tests {
     /// Stretched along an angle, the work per strain is that of the measured stress, at any strain.
     #[test]
     fn work_of_proportional_loading_is_the_measured_one() {
-        let (law, data) = (MeasuredStretch::new(&fabric()), fabric());
+        let (law, data) = (
+            MeasuredStretch::new(&fabric(), &ElasticSettings::default()),
+            fabric(),
+        );
         assert!(law.between < 1e-9);
         for k in 0..ANGLES {
             let angle = k as f64 * std::f64::consts::PI / 8.0;
@@ -350,7 +345,7 @@ mod tests {
     fn integrable_data_keep_their_stress() {
         let mut data = fabric();
         data.stretching = vec![vec![50.0, 10.0, 90.0, 30.0]; 6];
-        let law = MeasuredStretch::new(&data);
+        let law = MeasuredStretch::new(&data, &ElasticSettings::default());
         for e in [principal(0.2, 0.1, 0.5), principal(0.3, -0.1, 1.0)] {
             assert!((law.expand(&e).gradient - stiffness(&data, 0) * e).norm() < 1e-10);
         }
@@ -366,7 +361,7 @@ mod tests {
         let files = files.map(|f| f.expect("entry").path());
         for path in files.filter(|p| p.extension().is_some_and(|e| e == "json")) {
             let data = read_fabric(&path).expect("fabric");
-            let law = MeasuredStretch::new(&data);
+            let law = MeasuredStretch::new(&data, &ElasticSettings::default());
             let mut worst = 0.0f64;
             for k in 0..ANGLES {
                 for strain in [0.1, 0.25, 0.5, 0.75, 1.0].map(|t| t * STRAIN) {
@@ -390,7 +385,8 @@ mod tests {
                     let e = principal(a, b, 0.1 * f64::from(i + j));
                     let w = law.expand(&e);
                     assert!(
-                        w.value >= 0.49 * LEAST_ELSEWHERE * e.norm_squared(),
+                        w.value
+                            >= 0.49 * ElasticSettings::default().least_elsewhere * e.norm_squared(),
                         "{path:?} {e}"
                     );
                 }

@@ -40,12 +40,6 @@ impl MembraneElement {
         let w = law.expand(&green_strain(&f));
         self.assemble(&f, &w, &projected_blocks(&f, &w))
     }
-    /// Energy with gradient and the Hessian as it is, indefinite under compression.
-    pub fn expand_exact(&self, law: &StretchLaw, x: &[V3d; 3]) -> ElementEnergy<9> {
-        let f = self.deformation(x);
-        let w = law.expand(&green_strain(&f));
-        self.assemble(&f, &w, &exact_blocks(&f, &w))
-    }
     /// Energy by the corners, of derivatives by F.
     fn assemble(&self, f: &Matrix3x2<f64>, w: &Jet, h: &BlocksByF) -> ElementEnergy<9> {
         let (area, b) = (self.rest.area, &self.rest.shape);
@@ -88,24 +82,7 @@ fn stress(w: &Jet) -> Matrix2<f64> {
     Matrix2::new(s[0], s[2], s[2], s[1])
 }
 
-/// Jᵀ C J + S ⊗ I.
-fn exact_blocks(f: &Matrix3x2<f64>, w: &Jet) -> BlocksByF {
-    let zero = Matrix3::zeros();
-    // Derivative of the strain by U and by V: rows are the strains.
-    let (u, v) = (f.column(0), f.column(1));
-    let by_u = Matrix3::from_columns(&[u.into(), Vector3::zeros(), v.into()]);
-    let by_v = Matrix3::from_columns(&[Vector3::zeros(), v.into(), u.into()]);
-    let (s, by) = (stress(w), [by_u, by_v]);
-    let mut h = [[zero; 2]; 2];
-    for a in 0..2 {
-        for b in 0..2 {
-            h[a][b] = by[a] * w.hessian * by[b].transpose() + Matrix3::identity() * s[(a, b)];
-        }
-    }
-    h
-}
-
-/// Nearest positive semi-definite matrix to [`exact_blocks`].
+/// Nearest positive semi-definite matrix to Jᵀ C J + S ⊗ I.
 fn projected_blocks(f: &Matrix3x2<f64>, w: &Jet) -> BlocksByF {
     let (plane, normal) = frame(f);
     let s = stress(w);
@@ -200,6 +177,30 @@ mod tests {
         })
     }
 
+    /// Jᵀ C J + S ⊗ I.
+    fn exact_blocks(f: &Matrix3x2<f64>, w: &Jet) -> BlocksByF {
+        let zero = Matrix3::zeros();
+        // Derivative of the strain by U and by V: rows are the strains.
+        let (u, v) = (f.column(0), f.column(1));
+        let by_u = Matrix3::from_columns(&[u.into(), Vector3::zeros(), v.into()]);
+        let by_v = Matrix3::from_columns(&[Vector3::zeros(), v.into(), u.into()]);
+        let (s, by) = (stress(w), [by_u, by_v]);
+        let mut h = [[zero; 2]; 2];
+        for a in 0..2 {
+            for b in 0..2 {
+                h[a][b] = by[a] * w.hessian * by[b].transpose() + Matrix3::identity() * s[(a, b)];
+            }
+        }
+        h
+    }
+
+    /// Energy with gradient and the Hessian as it is, indefinite under compression: the oracle of the projection.
+    fn expand_exact(law: &StretchLaw, x: &[V3d; 3]) -> ElementEnergy<9> {
+        let f = element().deformation(x);
+        let w = law.expand(&green_strain(&f));
+        element().assemble(&f, &w, &exact_blocks(&f, &w))
+    }
+
     /// Corners of the element under a deformation gradient with these columns.
     fn deformed(u: [f64; 3], v: [f64; 3]) -> [V3d; 3] {
         element()
@@ -232,7 +233,7 @@ mod tests {
     #[test]
     fn derivatives_agree_with_differences() {
         let evaluate = |x: &[f64], weight: f64| {
-            let e = element().expand_exact(&law(weight), &corners(x));
+            let e = expand_exact(&law(weight), &corners(x));
             Derivatives::energy(e.value, e.gradient.as_slice().to_vec())
                 .with_hessian(DMatrix::from_column_slice(9, 9, e.hessian.as_slice()))
         };
@@ -251,7 +252,7 @@ mod tests {
         states.push(flat(deformed([0.0; 3], [0.0, 1e-200, 0.0])));
         states.push(flat(deformed([50.0, 0.0, 0.0], [0.0, 1e-9, 0.0])));
         for x in states {
-            let exact = element().expand_exact(&law(1.0), &corners(&x));
+            let exact = expand_exact(&law(1.0), &corners(&x));
             let psd = element().expand(&law(1.0), &corners(&x));
             assert_eq!((psd.value, psd.gradient), (exact.value, exact.gradient));
             // Oracle: the 9×9 eigenvalues. Shape functions are not orthonormal, so only signs compare.

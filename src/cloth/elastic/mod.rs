@@ -1,4 +1,4 @@
-//! Elasticity of a thin sheet in f64: stretch and bend laws, membranes, hinges, dihedral angles, the cloth model with its masses, assembly.
+//! Elasticity of a thin sheet in f64: stretch and bend laws, membranes, dihedral angles, the cloth model with its masses, assembly.
 
 pub(crate) mod assembly;
 pub(crate) mod bend_law;
@@ -11,7 +11,6 @@ mod error;
 mod fabric;
 mod fan_expansion;
 mod fans;
-pub(crate) mod hinge;
 mod jet;
 pub(crate) mod measured_bend;
 pub(crate) mod measured_stretch;
@@ -36,11 +35,10 @@ pub use bend_law::BendLaw;
 pub use dihedral::{Dihedral, SheetMotion};
 pub use error::ElasticError;
 pub use fabric::ElasticFabric;
-pub use hinge::{AngleHessian, HingeElement};
 pub use jet::Jet;
 pub use measured_bend::MeasuredBend;
 pub use measured_stretch::MeasuredStretch;
 pub use membrane::MembraneElement;
-pub use model::{BendingModel, ClothModel};
+pub use model::ClothModel;
 pub use rest_sheet::{RestSheet, RestTriangle};
 pub use stretch_law::{StretchLaw, Stretching};

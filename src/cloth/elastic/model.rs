@@ -1,28 +1,16 @@
 //! Elastic model of a sheet: masses, elements, energy and its second-order expansion.
 
 use super::curvature_set::CurvatureSet;
-use super::edges::{InteriorEdge, interior_edges};
-use super::element_set::{CHUNK, ElementSet, pairs_of};
-use super::hinge::AngleHessian;
+use super::edges::interior_edges;
+use super::element_set::{CHUNK, ElementSet};
 use super::packed::Packed;
 use super::{
-    ElasticError, ElasticExpansion, ElasticFabric, HingeElement, MembraneElement, RestSheet,
-    RestTriangle, SheetMotion,
+    ElasticError, ElasticExpansion, ElasticFabric, MembraneElement, RestSheet, RestTriangle,
+    SheetMotion,
 };
 use tryon_geometry::math::V3d;
+use tryon_geometry::mesh::edges;
 use tryon_geometry::par::{Par, map_into};
-
-/// Discretisation of bending.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum BendingModel {
-    /// Membrane only.
-    None,
-    /// One dihedral angle an edge (Bridson et al. 2003): depends on the directions of edges.
-    Hinges,
-    /// One curvature tensor a vertex, from the dihedral angles around it.
-    #[default]
-    Curvature,
-}
 
 /// Elastic sheet on a fixed mesh. Positions are in metres, shape `[vertices]`, energies in joules.
 #[derive(Clone, Debug)]
@@ -31,9 +19,7 @@ pub struct ClothModel {
     masses: Vec<f64>,
     pairs: Vec<[u32; 2]>,
     membranes: Vec<MembraneElement>,
-    membrane_set: ElementSet<3, 6>,
-    hinges: Vec<HingeElement>,
-    hinge_set: ElementSet<4, 10>,
+    membrane_set: ElementSet,
     curvatures: CurvatureSet,
 }
 
@@ -46,25 +32,12 @@ impl ClothModel {
         rest: &RestSheet,
         vertices: usize,
         fabric: ElasticFabric,
-        bending: BendingModel,
     ) -> Result<Self, ElasticError> {
         fabric.check()?;
         let triangles = rest.triangles(vertices)?;
-        let edges = match bending {
-            BendingModel::None => Vec::new(),
-            BendingModel::Hinges | BendingModel::Curvature => interior_edges(&rest.faces),
-        };
-        let (mut hinges, mut hinge_corners) = (Vec::new(), Vec::new());
-        let mut curvatures = CurvatureSet::default();
-        if bending == BendingModel::Curvature {
-            let d = fabric.bend.at_rest();
-            curvatures = CurvatureSet::new(rest, &triangles, &edges, &d);
-        } else {
-            hinges = edges.iter().map(|e| hinge(e, &triangles, rest)).collect();
-            hinge_corners = edges.iter().map(|e| e.corners).collect();
-        }
-        let mut pairs = pairs_of(&rest.faces);
-        pairs.extend(pairs_of(&hinge_corners));
+        let hinges = interior_edges(&rest.faces);
+        let mut curvatures = CurvatureSet::new(rest, &triangles, &hinges, &fabric.bend.at_rest());
+        let mut pairs = edges(&rest.faces);
         pairs.extend(curvatures.pairs());
         pairs.sort_unstable();
         pairs.dedup();
@@ -72,13 +45,11 @@ impl ClothModel {
         Ok(Self {
             masses: lumped_masses(&rest.faces, &triangles, vertices, fabric.area_density),
             membrane_set: ElementSet::new(rest.faces.clone(), vertices, &pairs),
-            hinge_set: ElementSet::new(hinge_corners, vertices, &pairs),
             curvatures,
             membranes: triangles
                 .into_iter()
                 .map(|rest| MembraneElement { rest })
                 .collect(),
-            hinges,
             fabric,
             pairs,
         })
@@ -118,17 +89,7 @@ impl ClothModel {
             self.membranes[k].value(&self.fabric.stretch, &self.membrane_set.corners(k, x))
         });
         let stretch = values.iter().sum::<f64>();
-        map_into(par, self.hinges.len(), CHUNK, &mut values, |k| {
-            if at.is_asleep(self.hinge_set.vertices(k)) {
-                return 0.0;
-            }
-            self.hinges[k].moved_value(&self.fabric.bend, &self.hinge_motion(k, at))
-        });
-        let folds = values.iter().sum::<f64>();
-        stretch + folds + self.curvatures.energy(&self.fabric.bend, par, at)
-    }
-    fn hinge_motion(&self, k: usize, at: &SheetMotion<'_>) -> [[V3d; 4]; 2] {
-        [at.start, at.now].map(|x| self.hinge_set.corners(k, x))
+        stretch + self.curvatures.energy(&self.fabric.bend, par, at)
     }
     /// Energy, gradient and positive semi-definite Hessian at `x`, the same bits at any number of threads.
     pub fn expand(&self, par: Par, x: &[V3d], out: &mut ElasticExpansion) {
@@ -147,14 +108,6 @@ impl ClothModel {
                 let at = self.membrane_set.corners(k, x);
                 Packed::new(&self.membranes[k].expand(&self.fabric.stretch, &at))
             });
-        self.hinge_set.assemble(par, &mut buffers.hinges, out, |k| {
-            if at.is_asleep(self.hinge_set.vertices(k)) {
-                return Packed::default();
-            }
-            let motion = self.hinge_motion(k, at);
-            let second = AngleHessian::GaussNewton;
-            Packed::new(&self.hinges[k].moved_expansion(&self.fabric.bend, &motion, second))
-        });
         let (law, buffer) = (&self.fabric.bend, &mut buffers.curvatures);
         self.curvatures.assemble(law, par, at, buffer, out);
         out.buffers = buffers;
@@ -175,18 +128,6 @@ fn lumped_masses(
         }
     }
     masses
-}
-
-/// Hinge of an interior edge.
-fn hinge(edge: &InteriorEdge, triangles: &[RestTriangle], rest: &RestSheet) -> HingeElement {
-    let wings = edge.wings(triangles);
-    let mean_length = 0.5 * (wings[0].length + wings[1].length);
-    HingeElement::new(
-        wings.map(|w| w.normal),
-        mean_length,
-        wings[0].area + wings[1].area,
-        edge.rest_angle(rest.folded.as_deref()),
-    )
 }
 
 #[cfg(test)]
@@ -231,6 +172,18 @@ mod tests {
         (RestSheet::flat(faces, &rest).expect("faces"), state)
     }
 
+    /// A triangle in its plane, its first edge along u.
+    fn laid_flat([a, b, c]: [V3d; 3]) -> [Vector2<f64>; 3] {
+        let (e, d) = (b - a, c - a);
+        let u = e.normalize();
+        let v = e.cross(&d).normalize().cross(&u);
+        [
+            Vector2::zeros(),
+            Vector2::new(u.dot(&e), v.dot(&e)),
+            Vector2::new(u.dot(&d), v.dot(&d)),
+        ]
+    }
+
     fn dense(model: &ClothModel, e: &ElasticExpansion) -> DMatrix<f64> {
         let n = model.vertex_count();
         let mut h = DMatrix::zeros(3 * n, 3 * n);
@@ -257,49 +210,46 @@ mod tests {
 
     #[test]
     fn sums_are_the_derivatives_of_the_energy() {
-        for bending in [BendingModel::Hinges, BendingModel::Curvature] {
-            let (rest, state) = sheet(2);
-            let model = ClothModel::new(&rest, state.len(), fabric(), bending).expect("valid");
-            let evaluate = |x: &[f64], weight: f64| {
-                let x: Vec<V3d> = x.chunks(3).map(V3d::from_column_slice).collect();
-                let e = expanded(&model, &x);
-                assert!((model.energy(Par::Seq, &x) - e.value).abs() <= 1e-14 * e.value);
-                let gradient = stacked(&e.gradient)
-                    .into_iter()
-                    .map(|g| weight * g)
-                    .collect();
-                (
-                    Derivatives::energy(weight * e.value, gradient),
-                    dense(&model, &e) * weight,
-                )
-            };
-            let check = DerivativeCheck {
-                step: 1e-6,
-                ..DerivativeCheck::default()
-            };
-            check.run(&[stacked(&state)], |x, w| evaluate(x, w).0);
-            // In tension and flat nothing is projected: the Hessian is the derivative of the gradient.
-            let stretched = |p: &V3d| V3d::new(p.x, 0.0, 1.1 * p.z);
-            let flat: Vec<V3d> = state.iter().map(stretched).collect();
-            check.run(&[stacked(&flat)], |x, w| {
-                let (energy, hessian) = evaluate(x, w);
-                energy.with_hessian(hessian)
-            });
-            let e = expanded(&model, &flat);
-            let mut product = vec![V3d::zeros(); flat.len()];
-            e.multiply(model.pairs(), &state, &mut product);
-            let expected =
-                dense(&model, &e) * DMatrix::from_vec(stacked(&state).len(), 1, stacked(&state));
-            let error =
-                (DMatrix::from_vec(expected.len(), 1, stacked(&product)) - &expected).norm();
-            assert!(error < 1e-12 * expected.norm());
-        }
+        let (rest, state) = sheet(2);
+        let model = ClothModel::new(&rest, state.len(), fabric()).expect("valid");
+        let evaluate = |x: &[f64], weight: f64| {
+            let x: Vec<V3d> = x.chunks(3).map(V3d::from_column_slice).collect();
+            let e = expanded(&model, &x);
+            assert!((model.energy(Par::Seq, &x) - e.value).abs() <= 1e-14 * e.value);
+            let gradient = stacked(&e.gradient)
+                .into_iter()
+                .map(|g| weight * g)
+                .collect();
+            (
+                Derivatives::energy(weight * e.value, gradient),
+                dense(&model, &e) * weight,
+            )
+        };
+        let check = DerivativeCheck {
+            step: 1e-6,
+            ..DerivativeCheck::default()
+        };
+        check.run(&[stacked(&state)], |x, w| evaluate(x, w).0);
+        // In tension and flat nothing is projected: the Hessian is the derivative of the gradient.
+        let stretched = |p: &V3d| V3d::new(p.x, 0.0, 1.1 * p.z);
+        let flat: Vec<V3d> = state.iter().map(stretched).collect();
+        check.run(&[stacked(&flat)], |x, w| {
+            let (energy, hessian) = evaluate(x, w);
+            energy.with_hessian(hessian)
+        });
+        let e = expanded(&model, &flat);
+        let mut product = vec![V3d::zeros(); flat.len()];
+        e.multiply(model.pairs(), &state, &mut product);
+        let expected =
+            dense(&model, &e) * DMatrix::from_vec(stacked(&state).len(), 1, stacked(&state));
+        let error = (DMatrix::from_vec(expected.len(), 1, stacked(&product)) - &expected).norm();
+        assert!(error < 1e-12 * expected.norm());
     }
 
     #[test]
     fn expansion_has_the_same_bits_at_any_thread_count() {
         let (rest, state) = sheet(30);
-        let model = ClothModel::new(&rest, state.len(), fabric(), BendingModel::Curvature);
+        let model = ClothModel::new(&rest, state.len(), fabric());
         let model = model.expect("valid");
         let run = |par| {
             let mut e = ElasticExpansion::default();
@@ -340,40 +290,45 @@ mod tests {
             (tetrahedron, vec![V3d::zeros(), x, y, z]),
             (octahedron, vec![x, y, -x, -y, z, -z]),
         ] {
-            let rest = RestSheet::surface(faces, &at, &V3d::new(0.3, 0.5, 0.9)).expect("faces");
-            for bending in [BendingModel::Hinges, BendingModel::Curvature] {
-                let model = ClothModel::new(&rest, at.len(), fabric(), bending).expect("valid");
-                let e = expanded(&model, &at);
-                assert!(e.value < 1e-25, "{}", e.value);
-                assert!(e.gradient.iter().all(|g| g.norm() < 1e-10));
-                // Squeezed, it resists with the derivative of its energy.
-                let squeezed: Vec<V3d> = at.iter().map(|p| V3d::new(p.x, p.y, 0.8 * p.z)).collect();
-                assert!(expanded(&model, &squeezed).value > 0.1);
-                let check = DerivativeCheck {
-                    step: 1e-6,
-                    ..DerivativeCheck::default()
-                };
-                check.run(&[stacked(&squeezed)], |x, weight| {
-                    let x: Vec<V3d> = x.chunks(3).map(V3d::from_column_slice).collect();
-                    let e = expanded(&model, &x);
-                    let gradient = stacked(&e.gradient)
-                        .into_iter()
-                        .map(|g| weight * g)
-                        .collect();
-                    Derivatives::energy(weight * e.value, gradient)
-                });
-            }
+            let rest = RestSheet {
+                corners: faces
+                    .iter()
+                    .map(|f| laid_flat(f.map(|v| at[v as usize])))
+                    .collect(),
+                faces,
+                folded: Some(at.clone()),
+            };
+            let model = ClothModel::new(&rest, at.len(), fabric()).expect("valid");
+            let e = expanded(&model, &at);
+            assert!(e.value < 1e-25, "{}", e.value);
+            assert!(e.gradient.iter().all(|g| g.norm() < 1e-10));
+            // Squeezed, it resists with the derivative of its energy.
+            let squeezed: Vec<V3d> = at.iter().map(|p| V3d::new(p.x, p.y, 0.8 * p.z)).collect();
+            assert!(expanded(&model, &squeezed).value > 0.1);
+            let check = DerivativeCheck {
+                step: 1e-6,
+                ..DerivativeCheck::default()
+            };
+            check.run(&[stacked(&squeezed)], |x, weight| {
+                let x: Vec<V3d> = x.chunks(3).map(V3d::from_column_slice).collect();
+                let e = expanded(&model, &x);
+                let gradient = stacked(&e.gradient)
+                    .into_iter()
+                    .map(|g| weight * g)
+                    .collect();
+                Derivatives::energy(weight * e.value, gradient)
+            });
         }
     }
 
     #[test]
     fn masses_sum_to_that_of_the_sheet_and_faults_are_named() {
         let (rest, state) = sheet(4);
-        let model = ClothModel::new(&rest, state.len(), fabric(), BendingModel::None);
+        let model = ClothModel::new(&rest, state.len(), fabric());
         let total: f64 = model.expect("valid").masses().iter().sum();
         assert!((total - 0.2 * 0.16).abs() < 1e-12);
         let fault = |rest: &RestSheet, fabric| {
-            ClothModel::new(rest, 25, fabric, BendingModel::Hinges)
+            ClothModel::new(rest, 25, fabric)
                 .map(|_| ())
                 .expect_err("fault")
         };
@@ -385,7 +340,7 @@ mod tests {
         ));
         let mut twice = rest.clone();
         twice.faces[1] = twice.faces[0];
-        let seam = ClothModel::new(&twice, 25, fabric(), BendingModel::Hinges);
+        let seam = ClothModel::new(&twice, 25, fabric());
         assert!(seam.is_ok(), "a seam of three panels is no hinge");
         let mut light = fabric();
         light.area_density = 0.0;

@@ -64,27 +64,6 @@ impl RestSheet {
             folded: None,
         })
     }
-    /// Surface in space whose triangles and angles are at rest; the weft is `weft` projected into each triangle.
-    ///
-    /// # Errors
-    /// [`ElasticError::Face`] for a face out of range, [`ElasticError::Area`] for one without area.
-    pub fn surface(faces: Vec<[u32; 3]>, at: &[V3d], weft: &V3d) -> Result<Self, ElasticError> {
-        let mut corners = Vec::with_capacity(faces.len());
-        for (k, f) in faces.iter().enumerate() {
-            if f.iter().any(|&v| v as usize >= at.len()) {
-                return Err(ElasticError::Face(k));
-            }
-            corners.push(
-                flatten(f.map(|v| at[v as usize]), weft)
-                    .ok_or(ElasticError::Area { face: k, area: 0.0 })?,
-            );
-        }
-        Ok(Self {
-            faces,
-            corners,
-            folded: Some(at.to_vec()),
-        })
-    }
     /// All triangles, checked.
     ///
     /// # Errors
@@ -117,21 +96,4 @@ impl RestSheet {
             })
             .collect()
     }
-}
-
-/// Corner coordinates of a triangle in its plane, u along the projection of `weft`, else along its first edge.
-fn flatten(p: [V3d; 3], weft: &V3d) -> Option<[Vector2<f64>; 3]> {
-    /// Sine of the angle to the normal below which a weft has no direction in the plane.
-    const STEEP: f64 = 1e-3;
-    let (e, d) = (p[1] - p[0], p[2] - p[0]);
-    let n = e.cross(&d).try_normalize(f64::MIN_POSITIVE)?;
-    let along = weft - n * n.dot(weft);
-    let u = if along.norm() > STEEP * weft.norm() {
-        along.normalize()
-    } else {
-        e.normalize()
-    };
-    let v = n.cross(&u);
-    let at = |q: V3d| Vector2::new(u.dot(&q), v.dot(&q));
-    Some([Vector2::zeros(), at(e), at(d)])
 }

@@ -3,8 +3,7 @@
 use super::test_statics::Statics;
 use super::test_strips::{StripPattern, TestStrip, strip};
 use super::{
-    BendLaw, BendingModel, ClothModel, ElasticExpansion, ElasticFabric, RestSheet, StretchLaw,
-    Stretching,
+    BendLaw, ClothModel, ElasticExpansion, ElasticFabric, RestSheet, StretchLaw, Stretching,
 };
 use nalgebra::Matrix2;
 use tryon_formats::fabric_json::read_fabric;
@@ -29,7 +28,7 @@ fn fabric(stretch: StretchLaw, rigidity: f64) -> ElasticFabric {
 
 fn model(s: &TestStrip, fabric: ElasticFabric) -> ClothModel {
     let rest = RestSheet::flat(s.faces.clone(), &s.at).expect("faces");
-    ClothModel::new(&rest, s.at.len(), fabric, BendingModel::Curvature).expect("valid")
+    ClothModel::new(&rest, s.at.len(), fabric).expect("valid")
 }
 
 /// Positions of a strip under a homogeneous deformation of its plane.

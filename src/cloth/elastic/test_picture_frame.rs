@@ -8,8 +8,9 @@
 use super::test_curves::WOVEN;
 use super::test_statics::Statics;
 use super::test_strips::{StripPattern, TestStrip, strip};
-use super::{BendLaw, BendingModel, ClothModel, ElasticExpansion, ElasticFabric, RestSheet};
+use super::{BendLaw, ClothModel, ElasticExpansion, ElasticFabric, RestSheet};
 use super::{MeasuredStretch, StretchLaw};
+use crate::settings::ElasticSettings;
 use nalgebra::Vector2;
 use tryon_formats::fabric_json::read_fabric;
 use tryon_formats::shared_data;
@@ -42,10 +43,10 @@ impl Patch {
         let fabric = ElasticFabric {
             area_density: 0.2,
             stretch: stretch.clone(),
-            bend: BendLaw::isotropic(1e-5, 0.0),
+            bend: BendLaw::isotropic(0.0, 0.0),
         };
         let rest = RestSheet::flat(faces, &at).expect("faces");
-        let model = ClothModel::new(&rest, at.len(), fabric, BendingModel::None).expect("valid");
+        let model = ClothModel::new(&rest, at.len(), fabric).expect("valid");
         let on_side = |c: &f64| *c < 1e-9 || *c > SIDE - 1e-9;
         let clamped = at.iter().map(|p| p.iter().any(on_side)).collect();
         Self { at, model, clamped }
@@ -141,7 +142,10 @@ fn laws() -> Vec<ShearLaw> {
         };
         let data = read_fabric(&path).expect("fabric");
         all.push(ShearLaw {
-            stretch: StretchLaw::Measured(Box::new(MeasuredStretch::new(&data))),
+            stretch: StretchLaw::Measured(Box::new(MeasuredStretch::new(
+                &data,
+                &ElasticSettings::default(),
+            ))),
             // The data's third stretched row is that along 45°.
             moduli: [0, 3].map(|row| data.stretching[row][3]),
         });

@@ -3,7 +3,7 @@
 use super::error::OfflineError;
 use super::step::{OfflineFrameReport, OfflineSolver};
 use super::targets::FrameTargets;
-use std::ops::ControlFlow;
+use std::ops::{ControlFlow, RangeInclusive};
 use std::time::Instant;
 
 /// A frame that is done.
@@ -20,7 +20,7 @@ pub struct AnimationProgress {
 }
 
 impl OfflineSolver<'_> {
-    /// Simulates frames `first + 1` to `frames`, each of `duration` (s). `script` gives the targets of a frame;
+    /// Simulates `frames`, counted from 1, each of `duration` (s). `script` gives the targets of a frame;
     /// `progress` receives each frame with the solver and may break off. Returns the last frame done.
     ///
     /// # Errors
@@ -28,11 +28,12 @@ impl OfflineSolver<'_> {
     pub fn animate<'t>(
         &mut self,
         duration: f64,
-        (first, frames): (usize, usize),
+        frames: RangeInclusive<usize>,
         mut script: impl FnMut(usize) -> FrameTargets<'t>,
         mut progress: impl FnMut(&AnimationProgress, &Self) -> ControlFlow<()>,
     ) -> Result<usize, OfflineError> {
         let started = Instant::now();
+        let (first, frames) = (frames.start().saturating_sub(1), *frames.end());
         for frame in first + 1..=frames {
             let report = self.advance(duration, &script(frame))?;
             let spent = started.elapsed().as_secs_f64();

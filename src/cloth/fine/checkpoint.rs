@@ -80,7 +80,7 @@ impl Checkpoint {
         }
         let [frame, n, m, has_earlier, level, calm] = head;
         let state = reader
-            .state((n as usize, m as usize), has_earlier == 1)
+            .state([n as usize, m as usize], has_earlier == 1)
             .filter(|_| reader.0.is_empty());
         let (state, sleep) =
             state.ok_or_else(|| fault("wrong length, or a number that is not finite"))?;
@@ -170,11 +170,8 @@ impl Reader<'_> {
             v: self.vectors(count)?,
         })
     }
-    fn state(
-        &mut self,
-        (n, m): (usize, usize),
-        has_earlier: bool,
-    ) -> Option<(OfflineState, Sleep)> {
+    /// State of `n` vertices of cloth and `m` of the obstacle.
+    fn state(&mut self, [n, m]: [usize; 2], has_earlier: bool) -> Option<(OfflineState, Sleep)> {
         let (time, before) = (self.number()?, self.number()?);
         let since = self.number()?;
         let all = n.checked_add(m)?;

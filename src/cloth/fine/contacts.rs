@@ -7,51 +7,15 @@ use crate::contact::{
     ActivePair, Barrier, ContactAssembly, ContactElement, ContactMesh, ContactPair, Friction,
     FrictionPair,
 };
+use crate::settings::ContactSettings;
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 use tryon_geometry::linear::{BlockMatrix, BlockPattern, LinearError};
 use tryon_geometry::math::V3d;
 use tryon_geometry::par::{Par, map_into};
 
-/// Share of the way to the first impact that a step takes, so that no distance becomes zero.
-const IMPACT_SHARE: f64 = 0.8;
-
 /// Pairs that one thread takes at a time.
 const PAIRS: usize = 1024;
-
-/// Contact of cloth with itself and with the obstacle.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct ContactSettings {
-    /// Distance beyond the thickness at which the barrier begins (m).
-    pub activation: f64,
-    /// Distance that nothing goes below (m).
-    pub thickness: f64,
-    /// Stiffness of the barrier (J).
-    pub stiffness: f64,
-    /// Coulomb coefficient.
-    pub friction: f64,
-    /// Speed from which friction is full (m/s); what sticks creeps slower than that.
-    pub creep: f64,
-    /// Displacement in one step from which friction is full at the latest (m): what sticks creeps less than that in a step,
-    /// however long. A fifth of what a drape counts as settled; decision 079 has others.
-    pub slip: f64,
-    /// Motion of vertices that the candidates allow for beyond that of the query (m). Larger: fewer queries, more pairs.
-    pub margin: f64,
-}
-
-impl Default for ContactSettings {
-    fn default() -> Self {
-        Self {
-            activation: 1e-3,
-            thickness: 0.0,
-            stiffness: 2e-5,
-            friction: 0.3,
-            creep: 5e-3,
-            slip: 1e-4,
-            margin: 1e-4,
-        }
-    }
-}
 
 impl ContactSettings {
     /// Barrier of these settings.
@@ -243,11 +207,12 @@ impl Contacts {
     pub(super) fn keep_gaps(
         &mut self,
         x: &[V3d],
-        (reach, stiffness): (f64, f64),
+        reach: f64,
         out: &mut NewtonSystem,
     ) -> Result<(), LinearError> {
         let own_reach = self.settings.barrier().reach();
-        let reach = reach.max(own_reach);
+        let stiffness = self.settings.gap_stiffness;
+        let reach = reach.min(self.settings.gap_reach).max(own_reach);
         let sweep = ContactSweep {
             start: x,
             end: x,
@@ -322,7 +287,7 @@ impl Contacts {
             min_separation: self.settings.thickness,
         };
         let impact = first_impact(&self.candidates, &motion, self.par);
-        impact.map_or(1.0, |i| i.time * IMPACT_SHARE)
+        impact.map_or(1.0, |i| i.time * self.settings.impact_share)
     }
 }
 

@@ -5,39 +5,10 @@ use super::integrator::TimeScheme;
 use super::newton::{NewtonReport, largest, mean};
 use super::step::OfflineSolver;
 use super::targets::{FrameScript, FrameTargets, StepTargets};
+use crate::settings::DrapeSettings;
 use serde::{Deserialize, Serialize};
 use std::ops::ControlFlow;
 use tryon_geometry::math::V3d;
-
-/// End of a static drape.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct DrapeSettings {
-    /// Root mean square motion in a step of the longest length that counts as settled (m); that of a single vertex is
-    /// 20 times as long at most.
-    pub tolerance: f64,
-    /// First and longest step (s). A longer one nears the quasi-static limit, and its systems are harder to solve.
-    pub steps: [f64; 2],
-    /// Most steps that are solved to what counts as settled, for the way to rest is of no interest.
-    pub most_steps: usize,
-    /// Most steps after those, solved to the solver's tolerance; none for a finer mesh to go on from here.
-    pub final_steps: usize,
-}
-
-impl Default for DrapeSettings {
-    fn default() -> Self {
-        Self {
-            tolerance: 1e-4,
-            steps: [1.0 / 60.0, 0.25],
-            most_steps: 60,
-            final_steps: 60,
-        }
-    }
-}
-
-/// Motion of a single vertex that is negligible beside a root mean square of 1: the defaults of Newton's method.
-const LARGEST: f64 = 20.0;
-/// Motion in the last iteration of a loosely solved step by the motion that counts as settled.
-const LOOSENESS: f64 = 5.0;
 
 /// Work and end of a static drape.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -92,9 +63,9 @@ impl OfflineSolver<'_> {
         self.settings.scheme = TimeScheme::ImplicitEuler;
         self.settings.error_rate = f64::INFINITY;
         let newton = &mut self.settings.newton;
-        let loose = LOOSENESS * drape.tolerance;
+        let loose = drape.looseness * drape.tolerance;
         newton.tolerance = newton.tolerance.max(loose);
-        newton.largest = newton.largest.max(LARGEST * loose);
+        newton.largest = newton.largest.max(drape.largest * loose);
         let mut h = drape.steps[0];
         let mut end = Ok(ControlFlow::Continue(()));
         for (newton, most) in [
@@ -134,8 +105,8 @@ impl OfflineSolver<'_> {
                 report.steps += 1;
                 let moved = self.motion_since(&before);
                 report.motion = largest(&moved).1;
-                let is_calm =
-                    mean(&moved) <= drape.tolerance && report.motion <= LARGEST * drape.tolerance;
+                let is_calm = mean(&moved) <= drape.tolerance
+                    && report.motion <= drape.largest * drape.tolerance;
                 report.settled = is_calm && *h >= drape.steps[1];
                 *h = (2.0 * *h).min(drape.steps[1]);
                 Ok(())

@@ -3,9 +3,7 @@
 use super::{
     ElasticTerm, ElementTerm, EnergyTerm, OfflineCloth, OfflineError, StitchSprings, sewn_pairs,
 };
-use crate::elastic::{
-    BendLaw, BendingModel, ClothModel, ElasticFabric, RestSheet, StretchLaw, Stretching,
-};
+use crate::elastic::{BendLaw, ClothModel, ElasticFabric, RestSheet, StretchLaw, Stretching};
 use nalgebra::Vector2;
 use tryon_garment::{GarmentMesh, Material};
 use tryon_geometry::math::V3d;
@@ -46,7 +44,7 @@ impl OfflineCloth {
                 folded: None,
             };
             let fabric = fabric_of(&garment.material);
-            let model = ClothModel::new(&rest, count, fabric, BendingModel::default())?;
+            let model = ClothModel::new(&rest, count, fabric)?;
             for (sum, own) in mass.iter_mut().zip(model.masses()) {
                 *sum += own;
             }
@@ -69,7 +67,7 @@ impl OfflineCloth {
         gravity: V3d,
     ) -> Result<Self, OfflineError> {
         let fabric = fabric_of(material);
-        let model = ClothModel::new(rest, count, fabric, BendingModel::default())?;
+        let model = ClothModel::new(rest, count, fabric)?;
         let (mass, sewn) = (model.masses().to_vec(), sewn_pairs(&seams.stitches));
         let terms: Vec<Box<dyn EnergyTerm>> = vec![
             Box::new(ElasticTerm::new(model)),

@@ -43,20 +43,21 @@ mod test_twist;
 #[cfg(test)]
 mod tests;
 
+pub use crate::settings::{
+    ContactSettings, DrapeSettings, NewtonSettings, ObstacleSpring, OfflineSettings, SleepSettings,
+    StartSettings,
+};
 pub use animation::AnimationProgress;
 pub use checkpoint::{checkpoint_frame, checkpoint_state};
-pub use contacts::{ContactReport, ContactSettings};
-pub use drape::{DrapeReport, DrapeSettings};
+pub use contacts::ContactReport;
+pub use drape::DrapeReport;
 pub use elastic_term::ElasticTerm;
 pub use energy_term::{ElementTerm, EnergyElements, EnergyTerm};
 pub use error::{NewtonFault, OfflineError};
 pub use integrator::{MotionState, OfflineState, TimeScheme};
-pub use linear_solver::LinearMethod;
 pub use model::{OfflineCloth, PinTarget};
-pub use newton::{NewtonReport, NewtonSettings};
-pub use obstacle::ObstacleSpring;
-pub use sleep::SleepSettings;
+pub use newton::NewtonReport;
 pub use start::{JoinedSurfaces, StartReport};
-pub use step::{OfflineFrameReport, OfflineSettings, OfflineSolver};
+pub use step::{OfflineFrameReport, OfflineSolver};
 pub use stitch::{StitchSprings, sewn_pairs};
 pub use targets::FrameTargets;

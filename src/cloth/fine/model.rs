@@ -8,10 +8,6 @@ use tryon_geometry::linear::{BlockMatrix, BlockPattern};
 use tryon_geometry::math::V3d;
 use tryon_geometry::mesh::Face;
 
-/// Stiffness of a pin (N/m): 1 µm for the weight of 1 kg. It adds to a diagonal block alone, so the condition of the
-/// preconditioned system does not suffer.
-const PIN_STIFFNESS: f64 = 1e7;
-
 /// A vertex that follows a scripted target.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PinTarget {
@@ -124,14 +120,13 @@ impl OfflineCloth {
 }
 
 impl PinTarget {
-    /// Energy at `x` (J).
-    pub(super) fn value(&self, x: &[V3d]) -> f64 {
-        0.5 * PIN_STIFFNESS * (x[self.vertex as usize] - self.target).norm_squared()
+    /// Energy at `x` of a spring of this stiffness (J).
+    pub(super) fn value(&self, x: &[V3d], stiffness: f64) -> f64 {
+        0.5 * stiffness * (x[self.vertex as usize] - self.target).norm_squared()
     }
 
-    /// Gradient at `x` (N), and the stiffness on the diagonal (N/m).
-    pub(super) fn expand(&self, x: &[V3d]) -> (V3d, f64) {
-        let apart = x[self.vertex as usize] - self.target;
-        (apart * PIN_STIFFNESS, PIN_STIFFNESS)
+    /// Gradient at `x` (N).
+    pub(super) fn gradient(&self, x: &[V3d], stiffness: f64) -> V3d {
+        (x[self.vertex as usize] - self.target) * stiffness
     }
 }

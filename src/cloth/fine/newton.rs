@@ -1,62 +1,26 @@
 //! Newton's method with an inexact linear solve and a backtracking line search whose longest step contact limits.
 
 use super::error::{NewtonFault, OfflineError};
-use super::linear_solver::{DirectionSolver, LinearMethod, LinearSystem};
+use super::linear_solver::{DirectionSolver, LinearSystem};
+use crate::settings::NewtonSettings;
 use serde::{Deserialize, Serialize};
-use tryon_geometry::linear::{BlockMatrix, CgAccuracy, LinearError, StopCriterion};
+use tryon_geometry::linear::{BlockMatrix, CgAccuracy, CgSettings, LinearError};
 use tryon_geometry::math::V3d;
+use tryon_geometry::par::Par;
 
-/// Share of the linear decrease that a step must reach (Armijo).
-const SUFFICIENT_DECREASE: f64 = 1e-4;
-/// Halvings of a step before the line search gives up.
-const MAX_HALVINGS: usize = 40;
-/// Accuracy, relative to that of other iterations, of one that would end the iteration.
-const TIGHTER: f64 = 0.1;
 /// Motion of all vertices below which nothing moves (m): rounding alone.
 const RESTING: f64 = 1e-12;
-/// Longest motion of a vertex in one iteration (m): longer ones make candidates of everything, which fills the memory.
-const LONGEST: f64 = 0.1;
 /// Decrease relative to the energy below which rounding decides, so that a full step is taken.
 const ROUNDING: f64 = 1e-13;
 
-/// End and means of the iteration.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct NewtonSettings {
-    /// Root mean square motion of the vertices in one iteration that counts as solved (m), as the line search left it.
-    pub tolerance: f64,
-    /// Largest motion of one vertex then (m).
-    pub largest: f64,
-    /// Most iterations.
-    pub iterations: usize,
-    /// Solver of the linear systems.
-    pub linear: LinearMethod,
-    /// Accuracy of conjugate gradients, as the share of [`CgAccuracy::Decrease`].
-    pub linear_share: f64,
-    /// Most iterations of conjugate gradients.
-    pub linear_iterations: usize,
-}
-
-impl Default for NewtonSettings {
-    fn default() -> Self {
-        Self {
-            tolerance: 1e-4,
-            largest: 2e-3,
-            iterations: 100,
-            linear: LinearMethod::default(),
-            linear_share: 0.2,
-            linear_iterations: 2000,
-        }
-    }
-}
-
 impl NewtonSettings {
-    /// Method and end of a linear solve, so many times as loose.
-    pub(super) fn linear(&self, looseness: f64) -> (LinearMethod, StopCriterion) {
-        let stop = StopCriterion {
+    /// End of a linear solve, so many times as loose.
+    pub(super) fn linear(&self, par: Par, looseness: f64) -> CgSettings {
+        CgSettings {
             accuracy: CgAccuracy::Decrease(looseness * self.linear_share),
             iterations: self.linear_iterations,
-        };
-        (self.linear, stop)
+            par,
+        }
     }
 
     /// True for a share of a direction so small that the iteration ends.
@@ -174,11 +138,13 @@ pub(super) fn minimise(
         if let Some(vertex) = first_not_finite(&system.gradient) {
             return Ok(Err(NewtonFault::NotFinite { vertex }));
         }
-        report.products += solver.solve(settings.linear(1.0), &system.linear(x), &mut direction)?;
+        let par = solver.par;
+        let linear = settings.linear(par, 1.0);
+        report.products += solver.solve(linear, &system.linear(x), &mut direction)?;
         report.iterations += 1;
         if settings.is_settled(&direction, 1.0) {
             // A small step may be one of which a loose solution has hidden the rest: rigid motion comes last.
-            let tight = settings.linear(TIGHTER);
+            let tight = settings.linear(par, settings.last_accuracy);
             report.products += solver.improve(tight, &system.linear(x), &mut direction)?;
         }
         last_motion = largest(&direction);
@@ -189,13 +155,19 @@ pub(super) fn minimise(
         if last_motion.1 < RESTING {
             return Ok(Ok(system));
         }
-        shorten(&mut direction, last_motion.1);
+        shorten(&mut direction, last_motion.1, settings.longest);
         let free = problem.free_share(x, &direction);
         if free < 1.0 {
             report.limited += 1;
             report.smallest_share = report.smallest_share.min(free);
         }
-        let (found, evaluations) = search_line(problem, &system, (x, &direction, free), &mut trial);
+        let line = SearchLine {
+            start: x,
+            direction: &direction,
+            free,
+            settings,
+        };
+        let (found, evaluations) = line.search(problem, &system, &mut trial);
         report.evaluations += evaluations;
         if found.is_none() {
             let (vertex, motion) = last_motion;
@@ -221,10 +193,10 @@ pub(super) fn minimise(
     }))
 }
 
-/// Scales a direction down to [`LONGEST`].
-fn shorten(direction: &mut [V3d], longest: f64) {
-    if longest > LONGEST {
-        direction.iter_mut().for_each(|d| *d *= LONGEST / longest);
+/// Scales a direction of this `length` down to `most` (m).
+fn shorten(direction: &mut [V3d], length: f64, most: f64) {
+    if length > most {
+        direction.iter_mut().for_each(|d| *d *= most / length);
     }
 }
 
@@ -234,26 +206,42 @@ fn first_not_finite(gradient: &[V3d]) -> Option<usize> {
         .position(|g| !g.iter().all(|c| c.is_finite()))
 }
 
-/// Longest of the halved steps that lowers the energy enough, from the `free` share of the direction; fills `trial`.
-/// Returns its share of the direction and the evaluations of the energy.
-fn search_line(
-    problem: &mut impl Minimised,
-    system: &NewtonSystem,
-    (x, direction, free): (&[V3d], &[V3d], f64),
-    trial: &mut [V3d],
-) -> (Option<f64>, usize) {
-    let slope = system.slope(direction);
-    let noise = ROUNDING * system.value.abs();
-    let mut share = free;
-    for halvings in 0..MAX_HALVINGS {
-        for (t, (x, p)) in trial.iter_mut().zip(x.iter().zip(direction)) {
-            *t = x + p * share;
+/// Segment along which the energy is searched.
+struct SearchLine<'a> {
+    start: &'a [V3d],
+    direction: &'a [V3d],
+    /// Share of the direction that passes through nothing.
+    free: f64,
+    settings: &'a NewtonSettings,
+}
+
+impl SearchLine<'_> {
+    /// Longest of the halved steps that lowers the energy enough; fills `trial`. Returns its share of the direction and the
+    /// evaluations of the energy.
+    fn search(
+        &self,
+        problem: &mut impl Minimised,
+        system: &NewtonSystem,
+        trial: &mut [V3d],
+    ) -> (Option<f64>, usize) {
+        let slope = system.slope(self.direction);
+        let noise = ROUNDING * system.value.abs();
+        let mut share = self.free;
+        let NewtonSettings {
+            sufficient_decrease,
+            max_halvings,
+            ..
+        } = *self.settings;
+        for halvings in 0..max_halvings {
+            for (t, (x, p)) in trial.iter_mut().zip(self.start.iter().zip(self.direction)) {
+                *t = x + p * share;
+            }
+            let value = problem.value(trial);
+            if value <= system.value + sufficient_decrease * share * slope + noise {
+                return (Some(share), halvings + 1);
+            }
+            share *= 0.5;
         }
-        let value = problem.value(trial);
-        if value <= system.value + SUFFICIENT_DECREASE * share * slope + noise {
-            return (Some(share), halvings + 1);
-        }
-        share *= 0.5;
+        (None, max_halvings)
     }
-    (None, MAX_HALVINGS)
 }

@@ -4,27 +4,9 @@
 //! therefore an unknown, held at its scripted target by a spring that is stiff up to the give and soft beyond it.
 
 use super::newton::NewtonSystem;
+use crate::settings::ObstacleSpring;
 use nalgebra::Matrix3;
-use serde::{Deserialize, Serialize};
 use tryon_geometry::math::V3d;
-
-/// Spring between an obstacle vertex and its target: E = k δ² (√(1 + d²/δ²) − 1).
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct ObstacleSpring {
-    /// k (N/m): stiffness near the target. Smaller: skin yields visibly to cloth that lies on it.
-    pub stiffness: f64,
-    /// δ (m): displacement from which the force, at most k δ, saturates.
-    pub give: f64,
-}
-
-impl Default for ObstacleSpring {
-    fn default() -> Self {
-        Self {
-            stiffness: 1e4,
-            give: 1e-3,
-        }
-    }
-}
 
 impl ObstacleSpring {
     /// Energy (J) at a displacement `d` from the target (m).

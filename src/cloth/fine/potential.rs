@@ -19,6 +19,8 @@ pub(super) struct StepPotential<'a> {
     /// 1/(γh)² (1/s²).
     pub(super) rate_squared: f64,
     pub(super) pins: &'a [PinTarget],
+    /// Stiffness of a pin (N/m).
+    pub(super) pin_stiffness: f64,
     /// Vertices that sleep; empty for none.
     pub(super) asleep: &'a [bool],
 }
@@ -47,7 +49,10 @@ impl StepPotential<'_> {
             // Measured from the inertial position, so that the sum stays small beside its changes.
             cloth.mass[i] * (kinetic - cloth.gravity.dot(&apart))
         });
-        inertia + self.pins.iter().map(|p| p.value(x)).sum::<f64>()
+        inertia
+            + (self.pins.iter())
+                .map(|p| p.value(x, self.pin_stiffness))
+                .sum::<f64>()
     }
 
     /// Energy, gradient and Hessian at `x`, replacing those in `out`; `out.shape` has the cloth's pattern.
@@ -65,9 +70,9 @@ impl StepPotential<'_> {
                 Matrix3::from_diagonal_element(m * self.rate_squared),
             );
         }
+        let block = Matrix3::from_diagonal_element(self.pin_stiffness);
         for pin in self.pins {
-            let (gradient, stiffness) = pin.expand(x);
-            let block = Matrix3::from_diagonal_element(stiffness);
+            let gradient = pin.gradient(x, self.pin_stiffness);
             out.add_diagonal(pin.vertex as usize, gradient, block);
         }
         for term in cloth.terms() {

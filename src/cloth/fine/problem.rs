@@ -3,9 +3,9 @@
 use super::contacts::Contacts;
 use super::error::OfflineError;
 use super::linear_solver::DirectionSolver;
-use super::newton::{Minimised, NewtonReport, NewtonSettings, NewtonSystem, largest};
-use super::obstacle::ObstacleSpring;
+use super::newton::{Minimised, NewtonReport, NewtonSystem, largest};
 use super::potential::StepPotential;
+use crate::settings::{NewtonSettings, ObstacleSpring};
 use nalgebra::Matrix3;
 use tryon_geometry::linear::LinearError;
 use tryon_geometry::math::V3d;
@@ -20,13 +20,6 @@ pub(super) struct StepProblem<'a> {
     pub(super) contacts: Option<&'a mut Contacts>,
     pub(super) par: Par,
 }
-
-/// Stiffness that keeps the gaps of a first guess (N/m): above that of membranes, so that these yield.
-const GAP_STIFFNESS: f64 = 1e4;
-/// Longest reach of these springs (m).
-const LONGEST_COUPLING: f64 = 0.01;
-/// Accuracy of the guess relative to that of an iteration: the forces of the moving obstacle dwarf those of cloth.
-const GUESS_ACCURACY: f64 = 1e-3;
 
 impl StepProblem<'_> {
     /// First guess of a step from `x`: one linear step in which the obstacle follows its script and gaps keep their width,
@@ -55,14 +48,11 @@ impl StepProblem<'_> {
             system.add_diagonal(n + j, d * -k, Matrix3::from_diagonal_element(k));
         }
         if let Some(contacts) = &mut self.contacts {
-            contacts.keep_gaps(x, (reach.min(LONGEST_COUPLING), GAP_STIFFNESS), &mut system)?;
+            contacts.keep_gaps(x, reach, &mut system)?;
         }
         let mut direction = vec![V3d::zeros(); x.len()];
-        report.products += solver.solve(
-            settings.linear(GUESS_ACCURACY),
-            &system.linear(x),
-            &mut direction,
-        )?;
+        let linear = settings.linear(self.par, settings.guess_accuracy);
+        report.products += solver.solve(linear, &system.linear(x), &mut direction)?;
         let free = self.free_share(x, &direction);
         for (x, d) in x.iter_mut().zip(&direction) {
             *x += d * free;

@@ -4,26 +4,7 @@
 //! an element, or in reach of the barrier, is awake, and at the latest after that time, in a frame in which nothing sleeps.
 //! So cloth that sleeps is behind by about that distance at most, and a swing at its turning point is not taken for rest.
 
-use serde::{Deserialize, Serialize};
 use tryon_geometry::math::V3d;
-
-/// When vertices sleep.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct SleepSettings {
-    /// Distance from one place up to which a vertex counts as still (m).
-    pub distance: f64,
-    /// Time that a vertex is still before it sleeps, and the longest that it sleeps (s).
-    pub time: f64,
-}
-
-impl Default for SleepSettings {
-    fn default() -> Self {
-        Self {
-            distance: 5e-4,
-            time: 0.25,
-        }
-    }
-}
 
 /// Still and sleeping vertices, those of the cloth before those of the obstacle.
 #[derive(Clone, Debug, Default)]

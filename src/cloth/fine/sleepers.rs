@@ -1,8 +1,9 @@
 //! Sleepers of a frame, and the time that each vertex has been still.
 
-use super::sleep::{Sleep, SleepSettings};
+use super::sleep::Sleep;
 use super::step::{OfflineFrameReport, OfflineSolver};
 use super::targets::FrameTargets;
+use crate::settings::SleepSettings;
 use tryon_geometry::math::V3d;
 
 impl OfflineSolver<'_> {

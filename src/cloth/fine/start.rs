@@ -6,21 +6,11 @@
 use super::error::OfflineError;
 use crate::contact::ContactMesh;
 use crate::contact::broad_phase::{BroadPhase, EdgeFace};
+use crate::settings::StartSettings;
 use serde::{Deserialize, Serialize};
 use tryon_geometry::math::V3d;
 use tryon_geometry::mesh::Face;
 use tryon_geometry::par::Par;
-
-/// Smoothing passes before a start is refused.
-const PASSES: usize = 60;
-/// Passes after which one more ring of vertices takes part; as many without fewer crossings end the repair.
-const PASSES_PER_RING: usize = 15;
-/// Distance by which the obstacle shrinks in one pass (m).
-const SHRINK: f64 = 5e-4;
-/// Displacement beyond which a repair is a change of the garment, and the start is refused (m).
-const LARGEST_REPAIR: f64 = 0.02;
-/// Share of the way to its neighbours' mean that a vertex moves in one pass.
-const SMOOTHING: f64 = 0.5;
 
 /// Changes that freed a start of its intersections.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -48,9 +38,10 @@ impl JoinedSurfaces<'_> {
     /// # Errors
     /// [`OfflineError::IntersectingStart`] naming all, when some stay or a vertex moved too far; `x` is then as it was.
     pub fn repair(&self, par: Par, x: &mut [V3d]) -> Result<StartReport, OfflineError> {
+        let settings = StartSettings::default();
         let begin = x.to_vec();
         let first = self.crossings(par, x);
-        let (passes, is_free) = self.relax_all(par, first.clone(), x);
+        let (passes, is_free) = self.relax_all(&settings, par, first.clone(), x);
         let mut report = StartReport {
             found: first.len(),
             passes,
@@ -60,19 +51,26 @@ impl JoinedSurfaces<'_> {
             let moved = &mut report.moved[usize::from(i >= self.0.cloth_vertices())];
             *moved = moved.max((a - b).norm());
         }
-        if !is_free || report.moved.iter().any(|m| *m > LARGEST_REPAIR) {
+        if !is_free || report.moved.iter().any(|m| *m > settings.largest) {
             x.copy_from_slice(&begin);
             return Err(OfflineError::IntersectingStart { crossings: first });
         }
         Ok(report)
     }
 
-    /// Repairs `x` until it is free or its crossings are as many as [`PASSES_PER_RING`] passes ago. Returns the passes, and
-    /// true if it is free.
-    fn relax_all(&self, par: Par, mut crossings: Vec<EdgeFace>, x: &mut [V3d]) -> (usize, bool) {
+    /// Repairs `x` until it is free or its crossings are as many as some passes ago. Returns the passes, and true if it is
+    /// free.
+    fn relax_all(
+        &self,
+        settings: &StartSettings,
+        par: Par,
+        mut crossings: Vec<EdgeFace>,
+        x: &mut [V3d],
+    ) -> (usize, bool) {
+        let per_ring = settings.passes_per_ring;
         let (mut passes, mut least, mut stalled) = (0, crossings.len(), 0);
-        while !crossings.is_empty() && passes < PASSES && stalled < PASSES_PER_RING {
-            self.relax(&crossings, passes / PASSES_PER_RING, x);
+        while !crossings.is_empty() && passes < settings.passes && stalled < per_ring {
+            self.relax(settings, &crossings, passes / per_ring, x);
             passes += 1;
             crossings = self.crossings(par, x);
             stalled = if crossings.len() < least {
@@ -86,7 +84,7 @@ impl JoinedSurfaces<'_> {
     }
 
     /// One pass around the crossings.
-    fn relax(&self, crossings: &[EdgeFace], rings: usize, x: &mut [V3d]) {
+    fn relax(&self, settings: &StartSettings, crossings: &[EdgeFace], rings: usize, x: &mut [V3d]) {
         let (faces, edges) = (self.0.faces(), self.0.edges());
         let mut marked = vec![false; x.len()];
         for EdgeFace { edge, face } in crossings {
@@ -122,9 +120,9 @@ impl JoinedSurfaces<'_> {
                 continue;
             }
             if i >= self.0.cloth_vertices() {
-                x[i] -= normal.try_normalize(0.0).unwrap_or_default() * SHRINK;
+                x[i] -= normal.try_normalize(0.0).unwrap_or_default() * settings.shrink;
             } else if marked[i] {
-                x[i] = x[i].lerp(&(sum / *count), SMOOTHING);
+                x[i] = x[i].lerp(&(sum / *count), settings.smoothing);
             }
         }
     }
@@ -191,8 +189,12 @@ mod tests {
             other => panic!("{other:?}"),
         }
         assert_eq!(x, before);
-        let (passes, is_free) = all.relax_all(Par::Seq, found, &mut x);
+        let settings = StartSettings::default();
+        let (passes, is_free) = all.relax_all(&settings, Par::Seq, found, &mut x);
         // Wider rings alone bring 24 crossings to 19 in 60 passes.
-        assert!(!is_free && passes <= PASSES_PER_RING + 1, "{passes} passes");
+        assert!(
+            !is_free && passes <= settings.passes_per_ring + 1,
+            "{passes} passes"
+        );
     }
 }

@@ -1,60 +1,24 @@
 //! One frame of cloth: implicit steps whose length follows the error and the solver.
 
 use super::checks::{check_frame, check_steps, check_vectors};
-use super::contacts::{ContactReport, ContactSettings, Contacts};
+use super::contacts::{ContactReport, Contacts};
 use super::error::{NewtonFault, OfflineError};
-use super::integrator::{MotionState, OfflineState, StepCoefficients, TimeScheme};
+use super::integrator::{MotionState, OfflineState, StepCoefficients};
 use super::linear_solver::DirectionSolver;
 use super::model::OfflineCloth;
-use super::newton::{NewtonReport, NewtonSettings, NewtonSystem, mean, minimise};
-use super::obstacle::ObstacleSpring;
+use super::newton::{NewtonReport, NewtonSystem, mean, minimise};
 use super::potential::StepPotential;
 use super::problem::StepProblem;
-use super::sleep::{Sleep, SleepSettings};
+use super::sleep::Sleep;
 use super::start::JoinedSurfaces;
 use super::targets::{FrameScript, FrameTargets, StepTargets};
 use crate::contact::ContactSurface;
+use crate::settings::OfflineSettings;
 use serde::{Deserialize, Serialize};
+use std::ops::RangeInclusive;
 use tryon_geometry::math::V3d;
 use tryon_geometry::mesh::Face;
 use tryon_geometry::par::Par;
-
-/// Settings of the time integration.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct OfflineSettings {
-    /// Order of the steps.
-    pub scheme: TimeScheme,
-    /// Longest step (s).
-    pub longest_step: f64,
-    /// Halvings of the longest step before a step that is not solved is an error.
-    pub halvings: u32,
-    /// Local error of a step that is accepted: root mean square over the vertices, per second (m/s). A smaller one follows
-    /// the exact motion longer, in more steps.
-    pub error_rate: f64,
-    /// Newton's method.
-    pub newton: NewtonSettings,
-    /// Contact; `None` lets surfaces pass through each other.
-    pub contact: Option<ContactSettings>,
-    /// Spring of the obstacle's vertices.
-    pub obstacle: ObstacleSpring,
-    /// Regions that are still sleep; `None` computes every frame whole.
-    pub sleep: Option<SleepSettings>,
-}
-
-impl Default for OfflineSettings {
-    fn default() -> Self {
-        Self {
-            scheme: TimeScheme::Bdf2,
-            longest_step: 1.0 / 60.0,
-            halvings: 10,
-            error_rate: 0.01,
-            newton: NewtonSettings::default(),
-            contact: Some(ContactSettings::default()),
-            obstacle: ObstacleSpring::default(),
-            sleep: Some(SleepSettings::default()),
-        }
-    }
-}
 
 impl OfflineSettings {
     /// Local error of a step of `h` (s) that is accepted (m, root mean square): no less than what the iteration leaves, which
@@ -100,11 +64,6 @@ pub struct OfflineSolver<'a> {
     /// Accepted steps since the last change of length.
     pub(super) calm_steps: u32,
 }
-
-/// Steps of one length before a longer one is tried: a two-step method needs two to settle.
-const STEPS_BEFORE_GROWTH: u32 = 4;
-/// Share of the allowed error below which the step doubles; a third-order local error grows eightfold.
-const GROWTH_SHARE: f64 = 0.1;
 
 impl<'a> OfflineSolver<'a> {
     /// Cloth at rest or in motion; `obstacle` has the triangles of the state's obstacle vertices.
@@ -224,10 +183,11 @@ impl<'a> OfflineSolver<'a> {
                     at += length;
                     report.steps += 1;
                     report.largest_error = report.largest_error.max(solved.error);
-                    let calm = solved.error <= GROWTH_SHARE * self.settings.allowed_error(h);
+                    let calm =
+                        solved.error <= self.settings.growth_share * self.settings.allowed_error(h);
                     aside = None;
                     self.accept(solved, h, start + duration * share);
-                    self.grow(calm, (coarsest, finest), at);
+                    self.grow(calm, coarsest..=finest, at);
                     continue;
                 }
                 Ok(_) => report.inaccurate += 1,
@@ -272,6 +232,7 @@ impl<'a> OfflineSolver<'a> {
                 inertial: &inertial,
                 rate_squared: coefficients.span.powi(-2),
                 pins: &targets.pins,
+                pin_stiffness: self.settings.pin_stiffness,
                 asleep: &self.sleep.asleep,
             },
             obstacle: &targets.obstacle,
@@ -326,8 +287,10 @@ impl<'a> OfflineSolver<'a> {
         }
         let x = self.state.unknowns();
         let mut slow = vec![V3d::zeros(); x.len()];
-        let how = self.settings.newton.linear(1.0);
-        report.products += self.directions.solve(how, &system.linear(&x), &mut slow)?;
+        let linear = self.settings.newton.linear(self.par, 1.0);
+        report.products += self
+            .directions
+            .solve(linear, &system.linear(&x), &mut slow)?;
         Ok(mean(&slow[..apart.len()]))
     }
 
@@ -338,13 +301,13 @@ impl<'a> OfflineSolver<'a> {
         self.state.time = time;
     }
 
-    /// Doubles the step when it was accurate for a while and the frame's grid allows it.
-    fn grow(&mut self, calm: bool, (coarsest, finest): (u32, u32), at: u64) {
+    /// Doubles the step, whose halvings stay within `levels`, when it was accurate for a while and the frame's grid allows it.
+    fn grow(&mut self, calm: bool, levels: RangeInclusive<u32>, at: u64) {
         self.calm_steps = if calm { self.calm_steps + 1 } else { 0 };
-        if self.calm_steps < STEPS_BEFORE_GROWTH || self.level <= coarsest {
+        if self.calm_steps < self.settings.steps_before_growth || self.level <= *levels.start() {
             return;
         }
-        if at.is_multiple_of(1 << (finest - self.level + 1)) {
+        if at.is_multiple_of(1 << (levels.end() - self.level + 1)) {
             self.level -= 1;
             self.calm_steps = 0;
         }

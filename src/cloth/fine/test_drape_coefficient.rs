@@ -43,7 +43,7 @@ impl Specimen {
                 Vector2::new(c, s) * radius(k)
             }));
             if k > 0 {
-                join_rings(&mut sheet, (inner, first));
+                join_rings(&mut sheet, [inner, first]);
             }
             if k < HELD {
                 held = sheet.at.len();
@@ -92,7 +92,7 @@ impl Specimen {
         let report = report.expect("a drape");
         assert!(report.settled, "{report:?}");
         let x = solver.state().now.x.clone();
-        assert_eq!(exhaustive_crossings((&x, &self.sheet.faces), (&[], &[])), 0);
+        assert_eq!(exhaustive_crossings([&x, &[]], [&self.sheet.faces, &[]]), 0);
         x
     }
 
@@ -125,7 +125,7 @@ impl Specimen {
 }
 
 /// Triangles between the last ring of `sheet`, from vertex `outer`, and the one before it, from `inner`.
-fn join_rings(sheet: &mut PlanarSheet, (inner, outer): (u32, u32)) {
+fn join_rings(sheet: &mut PlanarSheet, [inner, outer]: [u32; 2]) {
     let end = sheet.at.len() as u32;
     let [n, m] = [outer - inner, end - outer];
     let angle = |v: u32, turns: u32| {

@@ -35,7 +35,7 @@ fn a_step_without_solution_changes_nothing() {
         target: V3d::new(0.0, f64::NAN, 0.0),
     }];
     let mut lost = solver(coarse());
-    run(&mut lost, (&sheet.faces, &faces), 3, still);
+    run(&mut lost, [&sheet.faces, &faces], 3, still);
     let before = lost.state().clone();
     let targets = FrameTargets {
         pins: &pins,
@@ -62,7 +62,7 @@ fn cloth_at_rest_without_load_is_solved() {
     let cloth = sheet.cloth_in(isotropic(500.0, 0.0, 1e-5), V3d::zeros());
     let state = resting(&sheet.at_height(0.0), &[]);
     let mut solver = OfflineSolver::new(&cloth, &[], state, coarse(), Par::Seq).expect("solver");
-    run(&mut solver, (&sheet.faces, &[]), 3, still);
+    run(&mut solver, [&sheet.faces, &[]], 3, still);
 }
 
 /// A two-step method needs the state one step earlier to go on with the same bits.
@@ -72,7 +72,7 @@ fn a_step_without_solution_keeps_the_earlier_state() {
     let cloth = sheet.cloth(isotropic(500.0, 0.3, 1e-5));
     let state = resting(&sheet.at_height(0.0), &[]);
     let mut solver = OfflineSolver::new(&cloth, &[], state, coarse(), Par::Seq).expect("solver");
-    run(&mut solver, (&sheet.faces, &[]), 3, still);
+    run(&mut solver, [&sheet.faces, &[]], 3, still);
     let before = solver.state().clone();
     let pins = [PinTarget {
         vertex: 7,

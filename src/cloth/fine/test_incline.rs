@@ -47,7 +47,7 @@ impl Incline {
         let frame = |_| {
             let targets = FrameTargets::default();
             solver.advance(FRAME, &targets).expect("a frame");
-            assert_free(&solver, &patch.faces, &plane.faces);
+            assert_free(&solver, [&patch.faces, &plane.faces]);
             let moving = solver.state().now.v.iter().zip(&cloth.mass);
             moving.map(|(v, m)| v.dot(&down) * m).sum::<f64>() / mass
         };

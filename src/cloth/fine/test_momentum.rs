@@ -90,7 +90,7 @@ fn collide(newton: NewtonSettings) -> f64 {
     for _ in 0..6 {
         let targets = FrameTargets::default();
         solver.advance(1.0 / 120.0, &targets).expect("a frame");
-        assert_free(&solver, &both.faces, &[]);
+        assert_free(&solver, [&both.faces, &[]]);
     }
     let end = &solver.state().now;
     let apart: f64 = (0..25)

@@ -2,9 +2,7 @@
 
 use super::{ElasticTerm, MotionState, NewtonSettings, OfflineCloth, OfflineSolver, OfflineState};
 use crate::contact::edge_meets_triangle;
-use crate::elastic::{
-    BendLaw, BendingModel, ClothModel, ElasticFabric, RestSheet, StretchLaw, Stretching,
-};
+use crate::elastic::{BendLaw, ClothModel, ElasticFabric, RestSheet, StretchLaw, Stretching};
 use nalgebra::Vector2;
 use tryon_geometry::math::V3d;
 use tryon_geometry::mesh::{Face, edges};
@@ -65,7 +63,7 @@ impl PlanarSheet {
     /// Elastic model of the sheet.
     pub(super) fn model(&self, fabric: ElasticFabric) -> ClothModel {
         let rest = RestSheet::flat(self.faces.clone(), &self.at).expect("a sheet");
-        ClothModel::new(&rest, self.at.len(), fabric, BendingModel::default()).expect("a model")
+        ClothModel::new(&rest, self.at.len(), fabric).expect("a model")
     }
 
     /// Cloth in a field of gravity (m/s²).
@@ -129,15 +127,12 @@ pub(super) fn octahedron(centre: V3d, r: f64) -> (Vec<V3d>, Vec<Face>) {
 }
 
 /// Edges through faces, at least one of the two of the cloth: every edge with every face, in exact arithmetic, without the
-/// broad phase of the solver.
-pub(super) fn exhaustive_crossings(
-    (x, faces): (&[V3d], &[Face]),
-    (obstacle, obstacle_faces): (&[V3d], &[Face]),
-) -> usize {
-    let cloth = x.len() as u32;
-    let all: Vec<V3d> = x.iter().chain(obstacle).copied().collect();
-    let moved = obstacle_faces.iter().map(|f| f.map(|v| v + cloth));
-    let faces: Vec<Face> = faces.iter().copied().chain(moved).collect();
+/// broad phase of the solver. Positions and faces of cloth and obstacle.
+pub(super) fn exhaustive_crossings(x: [&[V3d]; 2], faces: [&[Face]; 2]) -> usize {
+    let cloth = x[0].len() as u32;
+    let all = x.concat();
+    let moved = faces[1].iter().map(|f| f.map(|v| v + cloth));
+    let faces: Vec<Face> = faces[0].iter().copied().chain(moved).collect();
     let mut found = 0;
     for edge in &edges(&faces) {
         let e = edge.map(|v| all[v as usize]);
@@ -166,10 +161,10 @@ fn boxes_meet(a: &[V3d], b: &[V3d]) -> bool {
     })
 }
 
-/// Asserts that no edge passes through a face at the solver's state.
-pub(super) fn assert_free(solver: &OfflineSolver<'_>, cloth: &[Face], obstacle: &[Face]) {
+/// Asserts that no edge passes through a face at the solver's state; `faces` of cloth and obstacle.
+pub(super) fn assert_free(solver: &OfflineSolver<'_>, faces: [&[Face]; 2]) {
     let state = solver.state();
-    let found = exhaustive_crossings((&state.now.x, cloth), (&state.obstacle[0], obstacle));
+    let found = exhaustive_crossings([&state.now.x, &state.obstacle[0]], faces);
     assert_eq!(found, 0, "crossings at {} s", state.time);
 }
 
@@ -185,7 +180,7 @@ fn exhaustive_count_sees_one_needle_through_a_sheet() {
             base + V3d::new(0.001, 0.1, 0.0),
         ]
     };
-    let count = |y| exhaustive_crossings((&x, &sheet.faces), (&needle(y), &[[0, 1, 2]]));
+    let count = |y| exhaustive_crossings([&x, &needle(y)], [&sheet.faces, &[[0, 1, 2]]]);
     assert_eq!(count(-0.05), 2);
     assert_eq!(count(0.001), 0);
 }

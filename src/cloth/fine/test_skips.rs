@@ -35,7 +35,7 @@ fn fall(margin: f64) -> (Vec<V3d>, [usize; 2]) {
         let contact = report.expect("a frame").contact;
         counts[0] += contact.queries;
         counts[1] += contact.reused;
-        assert_free(&solver, &sheet.faces, &faces);
+        assert_free(&solver, [&sheet.faces, &faces]);
     }
     (solver.state().now.x.clone(), counts)
 }
@@ -148,7 +148,7 @@ fn sleeping_cloth_is_behind_by_its_distance() {
         let state = resting(&sheet.at_height(0.0), &body);
         let mut solver = OfflineSolver::new(&cloth, &faces, state, settings, Par::Seq)?;
         let slept = wave(&mut solver, 0..40);
-        assert_free(&solver, &sheet.faces, &faces);
+        assert_free(&solver, [&sheet.faces, &faces]);
         Ok::<_, OfflineError>((solver.state().now.x.clone(), slept))
     };
     let (awake, none) = run(None).expect("a solver");
@@ -199,7 +199,7 @@ fn a_scene_at_rest_costs_nothing_and_wakes_with_its_table() {
     assert_eq!(woken.asleep, 0, "{woken:?}");
     let lowest = solver.state().now.x.iter().map(|p| p.y);
     assert!(lowest.fold(f64::INFINITY, f64::min) > 3e-3, "carried up");
-    assert_free(&solver, &sheet.faces, &faces);
+    assert_free(&solver, [&sheet.faces, &faces]);
 }
 
 #[test]

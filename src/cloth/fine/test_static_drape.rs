@@ -230,13 +230,13 @@ fn cloth_settled_on_a_spike_stays() {
     let report = solver.drape(&DrapeSettings::default(), |_| ControlFlow::Continue(()));
     let report = report.expect("a drape");
     assert!(report.settled, "{report:?}");
-    assert_free(&solver, &sheet.faces, &faces);
+    assert_free(&solver, [&sheet.faces, &faces]);
     let still = solver.state().now.x.clone();
     for _ in 0..15 {
         let targets = FrameTargets::default();
         solver.advance(1.0 / 60.0, &targets).expect("a frame");
     }
-    assert_free(&solver, &sheet.faces, &faces);
+    assert_free(&solver, [&sheet.faces, &faces]);
     let apart = largest_distance(&solver.state().now.x, &still);
     assert!(apart < 5e-3, "{apart} m");
 }

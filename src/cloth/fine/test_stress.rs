@@ -18,10 +18,10 @@ pub(super) fn coarse() -> OfflineSettings {
     }
 }
 
-/// Frames that must all end without an intersection and with finite positions.
+/// Frames that must all end without an intersection and with finite positions; `faces` of cloth and obstacle.
 pub(super) fn run(
     solver: &mut OfflineSolver<'_>,
-    (cloth, obstacle): (&[Face], &[Face]),
+    faces: [&[Face]; 2],
     frames: usize,
     mut targets: impl FnMut(usize) -> (Vec<PinTarget>, Vec<V3d>),
 ) {
@@ -35,7 +35,7 @@ pub(super) fn run(
         assert!(report.is_ok(), "frame {frame}: {report:?}");
         let x = &solver.state().now.x;
         assert!(x.iter().all(|p| p.iter().all(|c| c.is_finite())));
-        assert_free(solver, cloth, obstacle);
+        assert_free(solver, faces);
     }
 }
 
@@ -65,7 +65,7 @@ fn slivers_fall_on_a_spike() {
         let state = resting(&sheet.at_height(0.0), &body);
         let mut solver =
             OfflineSolver::new(&cloth, &faces, state, coarse(), Par::Seq).expect("solver");
-        run(&mut solver, (&sheet.faces, &faces), 10, still);
+        run(&mut solver, [&sheet.faces, &faces], 10, still);
     }
 }
 
@@ -113,7 +113,7 @@ fn press(gap: f64) {
     let frames = 12;
     run(
         &mut solver,
-        (&sheet.faces, &plates.faces),
+        [&sheet.faces, &plates.faces],
         frames,
         |frame| {
             let height = 16e-3 + (gap - 16e-3) * frame as f64 / frames as f64;
@@ -149,7 +149,7 @@ fn drop_pile(layers: u32) {
     let state = resting(&x, &plane.at_height(0.0));
     let mut solver =
         OfflineSolver::new(&cloth, &plane.faces, state, coarse(), Par::Seq).expect("solver");
-    run(&mut solver, (&pile.faces, &plane.faces), 6, still);
+    run(&mut solver, [&pile.faces, &plane.faces], 6, still);
     let order = |layer: usize| solver.state().now.x[9 * layer + 4].y;
     assert!((1..layers as usize).all(|l| order(l) > order(l - 1)));
 }
@@ -183,8 +183,8 @@ fn a_repaired_start_stays_free() {
     let cloth = sheet.cloth(isotropic(500.0, 0.3, 1e-5));
     let mut solver =
         OfflineSolver::new(&cloth, &plate.faces, state, coarse(), Par::Seq).expect("solver");
-    assert_free(&solver, &sheet.faces, &plate.faces);
-    run(&mut solver, (&sheet.faces, &plate.faces), 10, still);
+    assert_free(&solver, [&sheet.faces, &plate.faces]);
+    run(&mut solver, [&sheet.faces, &plate.faces], 10, still);
     let give = solver.state().obstacle[0].iter().zip(&target);
     let give = give.map(|(a, b)| (a - b).norm()).fold(0.0, f64::max);
     assert!(give < 1e-4, "the obstacle is {give} m from its target");
@@ -199,7 +199,7 @@ fn pull(stretch: f64) {
     let state = resting(&flat, &[]);
     let mut solver = OfflineSolver::new(&cloth, &[], state, coarse(), Par::Seq).expect("solver");
     let frames = 10;
-    run(&mut solver, (&sheet.faces, &[]), frames, |frame| {
+    run(&mut solver, [&sheet.faces, &[]], frames, |frame| {
         let factor = 1.0 + (stretch - 1.0) * frame as f64 / frames as f64;
         let ends = (0..flat.len()).filter(|v| matches!(v % 11, 0 | 10));
         let pin = |v: usize| PinTarget {
@@ -209,7 +209,7 @@ fn pull(stretch: f64) {
         (ends.map(pin).collect(), Vec::new())
     });
     // Let go.
-    run(&mut solver, (&sheet.faces, &[]), 5, still);
+    run(&mut solver, [&sheet.faces, &[]], 5, still);
     let x = &solver.state().now.x;
     let extent = (x[10] - x[0]).norm();
     assert!(extent < 0.25, "it springs back: {extent} m");
@@ -231,7 +231,7 @@ fn a_start_of_ten_times_the_size_is_solved() {
     let cloth = sheet.cloth(isotropic(500.0, 0.3, 1e-5));
     let state = resting(&x, &body);
     let mut solver = OfflineSolver::new(&cloth, &faces, state, coarse(), Par::Seq).expect("solver");
-    run(&mut solver, (&sheet.faces, &faces), 8, still);
+    run(&mut solver, [&sheet.faces, &faces], 8, still);
     let x = &solver.state().now.x;
     let extent = (x[8] - x[0]).norm();
     assert!(extent < 0.08, "{extent} m across");
@@ -250,7 +250,7 @@ fn a_body_of_ten_metres_a_second_takes_a_hanging_sheet_along() {
         vertex: v,
         target: x[v as usize],
     });
-    run(&mut solver, (&sheet.faces, &faces), 3, |frame| {
+    run(&mut solver, [&sheet.faces, &faces], 3, |frame| {
         let on = V3d::new(0.0, 0.0, 10.0 * FRAME * frame as f64);
         (pins.to_vec(), body.iter().map(|p| p + on).collect())
     });

@@ -133,7 +133,7 @@ fn wring(turns: f64, nearer: f64) -> f64 {
             obstacle: &[],
         };
         solver.advance(1.0 / 30.0, &targets).expect("a frame");
-        assert_free(&solver, &strip.sheet.faces, &[]);
+        assert_free(&solver, [&strip.sheet.faces, &[]]);
         assert!(strip.energy(&solver.state().now.x).is_finite());
     }
     let targets = FrameTargets {
@@ -146,7 +146,7 @@ fn wring(turns: f64, nearer: f64) -> f64 {
     };
     let report = solver.drape_to(&drape, &targets, |_| ControlFlow::Continue(()));
     report.expect("a drape");
-    assert_free(&solver, &strip.sheet.faces, &[]);
+    assert_free(&solver, [&strip.sheet.faces, &[]]);
     let helicoid = strip.helicoid(turns * TAU, nearer);
     strip.energy(&solver.state().now.x) / strip.energy(&helicoid)
 }

@@ -3,9 +3,7 @@
 use super::test_sheets::{octahedron, resting};
 use super::*;
 use crate::contact::{ContactMesh, ContactSurface};
-use crate::elastic::{
-    BendLaw, BendingModel, ClothModel, ElasticFabric, RestSheet, StretchLaw, Stretching,
-};
+use crate::elastic::{BendLaw, ClothModel, ElasticFabric, RestSheet, StretchLaw, Stretching};
 use nalgebra::Vector2;
 use std::ops::ControlFlow;
 use tryon_geometry::math::V3d;
@@ -34,7 +32,7 @@ fn cloth(x: &[V3d], faces: &[Face], young: f64) -> OfflineCloth {
         stretch: StretchLaw::Linear(Stretching::isotropic(young, 0.3)),
         bend: BendLaw::isotropic(1e-5, 0.3),
     };
-    let model = ClothModel::new(&rest, x.len(), fabric, BendingModel::default()).expect("a model");
+    let model = ClothModel::new(&rest, x.len(), fabric).expect("a model");
     let (mass, gravity) = (model.masses().to_vec(), V3d::new(0.0, -9.81, 0.0));
     OfflineCloth::new(
         mass,
@@ -150,7 +148,7 @@ fn frames_have_the_same_bits_at_any_thread_count_and_after_a_resume() {
         let last = solver
             .animate(
                 1.0 / 60.0,
-                (0, 8),
+                1..=8,
                 |_| FrameTargets::default(),
                 |done, solver| {
                     if done.frame == 5 {
@@ -172,7 +170,7 @@ fn frames_have_the_same_bits_at_any_thread_count_and_after_a_resume() {
     resumed
         .animate(
             1.0 / 60.0,
-            (frame, 8),
+            frame + 1..=8,
             |_| FrameTargets::default(),
             |_, _| ControlFlow::Continue(()),
         )
@@ -197,7 +195,7 @@ fn an_animation_breaks_off_where_it_is_told() {
         OfflineSolver::new(&cloth, &[], resting(&x, &[]), settings(), Par::Seq).expect("solver");
     let last = solver.animate(
         0.01,
-        (0, 9),
+        1..=9,
         |_| FrameTargets::default(),
         |done, _| {
             assert!(done.seconds.iter().all(|s| *s >= 0.0));

@@ -11,12 +11,6 @@ use super::workspace::Workspace;
 use crate::contact::SurfaceFrame;
 use tryon_geometry::par::{self, Par};
 
-/// Stretch ratio above which cloth is exempt from fold and speed limits: held open in an armpit, sleeves tear (p99 0.26
-/// instead of 0.16).
-const TAUT: f32 = 1.15;
-/// Stretch ratio above which contact constraints are released: more than knitwear is worn at.
-const OVERSTRETCHED: f32 = 1.5;
-
 /// One of the equal intervals of a step.
 #[derive(Clone, Copy)]
 pub(super) struct CollideInterval {
@@ -72,12 +66,15 @@ pub(super) fn collide(
     for_patches(model, patches, |g, k, p| {
         pin_anchors(model, g, k, &contacts, p);
         let patch = &model.garments[g].patches[k];
+        let settings = &model.config.solver;
         p.motion
-            .find_overstretched(patch, OVERSTRETCHED, &mut p.overstretched);
-        p.motion.find_overstretched(patch, TAUT, &mut p.taut);
+            .find_overstretched(patch, settings.overstretched, &mut p.overstretched);
+        p.motion
+            .find_overstretched(patch, settings.taut, &mut p.taut);
         let activation = FoldActivation {
             ratio: model.config.min_fold_ratio as f32,
             span,
+            settings: &settings.folds,
             except: Exemptions {
                 fixed: &p.pinned,
                 unlimited: &p.taut,

@@ -47,7 +47,7 @@ pub enum ClothError {
 
 impl ClothError {
     /// A setting that cannot be used.
-    pub(super) fn field(field: &str, why: &str) -> Self {
+    pub(crate) fn field(field: &str, why: &str) -> Self {
         Self::Field {
             field: field.to_owned(),
             why: why.to_owned(),

@@ -1,6 +1,5 @@
 //! Immutable data of one garment in an outfit.
 
-use super::config::Config;
 use super::contact::self_contact::SelfContactModel;
 use super::error::ClothError;
 use super::model::Sheet;
@@ -9,12 +8,9 @@ use super::repair::sleeve_rings::Sleeve;
 use super::sleep::island_model::{ISLAND, IslandModel};
 use super::solver::explicit::{PatchModel, StableSheet, StepSpec};
 use crate::contact::SurfaceModel;
+use crate::settings::Config;
 use tryon_garment::{GarmentMesh, Region};
 
-/// Substep above which accelerations need no smoothing, s. At 1/2400 s, with more smoothing, still cloth never slept.
-const UNSMOOTHED_STEP: f64 = 1.0 / 3600.0;
-/// Longest substep, s: beyond it contact is resolved too rarely.
-const MAX_SUBSTEP: f64 = 1e-3;
 /// Inverse of the time that [`Config::most_steps`] counts for, 1/s.
 const BUDGET_RATE: f64 = 60.0;
 
@@ -53,17 +49,19 @@ impl GarmentModel {
         offset: f64,
     ) -> Result<Self, ClothError> {
         let spec = substep(&sheet, config);
-        let stable = StableSheet::new(&sheet, &spec);
+        let stable = StableSheet::new(&sheet, &spec, &config.solver);
         // A substep couples one ring, one more per degree of smoothing, and one more for bending.
         let rings = 1 + spec.filter_degree + 1;
         let patches = stable.compile_patches(g.vertices.div_ceil(config.patch), rings, ISLAND);
         let own: Vec<u8> = g.regions.iter().map(|r| r.decisive().0).collect();
         let surface = SurfaceModel::new(g.faces.clone(), g.topology()?, own.clone());
-        let self_contact = SelfContactModel::new(surface, sheet.edges.iter().map(|e| e.1 as f32));
-        let edge = self_contact.edge();
+        let lengths = sheet.edges.iter().map(|e| e.1 as f32);
+        let self_contact = SelfContactModel::new(surface, lengths, config.contact.folds);
+        let [near, edges] = config.stillness.wake_distance;
+        let wake_distance = near + edges * self_contact.edge();
         Ok(Self {
-            islands: IslandModel::new(&patches, g.vertices, &sheet.edges, edge),
-            sleeves: Sleeve::find(g, &sheet.edges),
+            islands: IslandModel::new(&patches, g.vertices, &sheet.edges, wake_distance),
+            sleeves: Sleeve::find(g, &sheet.edges, &config.repair.sleeves),
             sheet,
             patches,
             h: spec.h,
@@ -105,17 +103,19 @@ impl GarmentModel {
 ///
 /// Smoothing of degree two tore clothes of 12 mm edges where layers and folds touch: finer ones are softened instead.
 fn substep(sheet: &Sheet, config: &Config) -> StepSpec {
-    let stable = StableSheet::stable_steps(sheet, config.force_lookahead);
+    let settings = &config.solver;
+    let stable = StableSheet::stable_steps(sheet, config.force_lookahead, settings);
     let plain = stable(0);
-    let smoothed = (plain < UNSMOOTHED_STEP)
+    let smoothed = (plain < settings.unsmoothed_step)
         .then(|| stable(1))
-        .filter(|h| *h >= UNSMOOTHED_STEP);
+        .filter(|h| *h >= settings.unsmoothed_step);
     let (smooth, h) = smoothed.map_or((0, plain), |h| (1, h));
-    let h = h.clamp(1.0 / (BUDGET_RATE * config.most_steps as f64), MAX_SUBSTEP);
+    let shortest = 1.0 / (BUDGET_RATE * config.most_steps as f64);
+    let h = h.clamp(shortest, settings.max_substep);
     StepSpec {
         h,
         lookahead: config.force_lookahead,
-        bending_interval: StableSheet::bending_interval(sheet, h),
+        bending_interval: StableSheet::bending_interval(sheet, h, settings),
         filter_degree: smooth,
     }
 }

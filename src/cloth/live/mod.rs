@@ -5,7 +5,6 @@
 pub(crate) mod collide;
 mod collision;
 pub(crate) mod commit;
-mod config;
 pub(crate) mod contact;
 mod error;
 mod garment_model;
@@ -24,8 +23,8 @@ pub(crate) mod step;
 mod test_outfit;
 mod workspace;
 
+pub use crate::settings::Config;
 pub use collision::collision_model;
-pub use config::Config;
 pub use contact::self_contact;
 pub use error::ClothError;
 pub use model::{Element, Hinge, Sheet};

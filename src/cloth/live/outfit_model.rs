@@ -1,7 +1,6 @@
 //! Immutable data of an outfit on a body.
 
 use super::collision::collision_model;
-use super::config::Config;
 use super::error::ClothError;
 use super::garment_model::GarmentModel;
 use super::model::Sheet;
@@ -10,6 +9,7 @@ use super::outfit::{AnchorBinding, Outfit};
 use super::repair::sleeve_rings::Arms;
 use super::sleep::island_model::skin_clusters;
 use crate::contact::{CollisionModel, MapView};
+use crate::settings::Config;
 use tryon_body::parts::vertex_masks;
 use tryon_body::{SkinWeights, Template};
 use tryon_garment::GarmentMesh;
@@ -50,7 +50,7 @@ impl Model {
     pub fn new(template: &Template, outfit: Outfit, config: Config) -> Result<Self, ClothError> {
         let body = WornBody {
             collision: collision_model(template, &config)?,
-            arms: Arms::new(template, &vertex_masks(template)),
+            arms: Arms::new(template, &vertex_masks(template), config.repair.sleeves),
             weights: template.weights().clone(),
             joints: template.skeleton().len(),
         };
@@ -81,7 +81,7 @@ impl Model {
             arms: body.arms,
             weights: body.weights,
             joints: body.joints,
-            views: MapView::around(config.camera_toward, config.map_detail),
+            views: MapView::around(config.camera_toward, config.map_detail, &config.maps),
             collision: body.collision,
             garments,
             outfit,

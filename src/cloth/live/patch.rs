@@ -11,7 +11,7 @@ use tryon_geometry::par;
 pub(super) struct PatchWork {
     pub(super) motion: PatchState,
     pub(super) asleep: Vec<bool>,
-    /// Stretched beyond [`super::collide`]'s `TAUT`: exempt from fold and speed limits.
+    /// Taut: exempt from fold and speed limits.
     pub(super) taut: Vec<bool>,
     /// Stretched beyond the ratio at which contact constraints are released.
     pub(super) overstretched: Vec<bool>,

@@ -4,13 +4,11 @@ use super::contact::chunk::ContactChunk;
 use super::garment_model::GarmentModel;
 use super::outfit_model::Model;
 use super::patch::PatchWork;
-use super::solver::explicit::{Exemptions, FoldLimit, Substep, V4, run_substeps};
+use super::solver::explicit::{
+    ContactPlane, Exemptions, FoldLimit, PatchState, Recovery, Substep, V4, run_substeps,
+};
 use tryon_geometry::par;
 
-/// Speed at which cloth below the skin comes out, m/s; faster, a body that closes on itself throws it.
-const BODY_RECOVERY: f32 = 1.0;
-/// The same for cloth on the wrong side of cloth, where the body may be in the way.
-const CLOTH_RECOVERY: f32 = 0.3;
 /// Evaluations of bending between two selections of the contact planes within reach.
 const PLANE_INTERVAL: usize = 2;
 
@@ -95,11 +93,17 @@ impl GarmentSolver<'_> {
         };
         p.motion.integrate_velocities(f, &step, &p.planes, &p.pins);
         p.motion.apply_pins(&p.pins, t, h);
-        FoldLimit::apply(&p.fold_limits, &mut p.motion, h);
+        let settings = &self.model.config.solver;
+        FoldLimit::apply(&p.fold_limits, &mut p.motion, h, &settings.folds);
         // The body has the last word.
         let (body, cloth) = p.planes.split_at(p.body_planes);
-        p.motion.resolve_contacts(cloth, t, h, CLOTH_RECOVERY);
-        p.contacts = p.motion.resolve_contacts(body, t, h, BODY_RECOVERY);
+        let recovery = |speed| Recovery {
+            share: settings.recovered,
+            speed,
+        };
+        p.motion
+            .resolve_contacts(cloth, t, h, recovery(settings.cloth_recovery));
+        p.contacts = (p.motion).resolve_contacts(body, t, h, recovery(settings.body_recovery));
         if let Some(limit) = self.interval.speed_limit {
             let exempt = Exemptions {
                 fixed: &p.pinned,
@@ -115,15 +119,19 @@ impl GarmentSolver<'_> {
     fn select_planes(&self, s: usize, k: usize, p: &mut PatchWork) {
         let steps = (PLANE_INTERVAL * self.m.bending_interval).min(self.substeps - s);
         let (t, span) = (s as f32 * self.h, steps as f32 * self.h);
+        let gain = self.model.config.solver.speed_gain;
+        let reach = |motion: &PatchState, planes: &[ContactPlane], out: &mut Vec<_>| {
+            motion.find_reachable(planes, [t, span], gain, out);
+        };
         let is_own = |c: &&ContactChunk| (c.garment, c.patch) == (self.garment, k);
         let (motion, planes) = (&p.motion, &mut p.planes);
         planes.clear();
         for c in self.chunks.iter().filter(is_own) {
-            motion.find_reachable(&c.body_planes, t, span, planes);
+            reach(motion, &c.body_planes, planes);
         }
         p.body_planes = planes.len();
         for c in self.chunks.iter().filter(is_own) {
-            motion.find_reachable(&c.cloth_planes, t, span, planes);
+            reach(motion, &c.cloth_planes, planes);
         }
     }
 }

@@ -11,7 +11,7 @@ use super::repair::recover_sleeves::recover_sleeves;
 use super::repair::teleport::Teleport;
 use super::report::StepReport;
 use super::sleep::{
-    BodyStep, follow_asleep, follow_sleeping, is_body_still, put_islands_to_sleep, speed_limit,
+    BodyStep, follow_asleep, follow_sleeping, is_body_still, put_islands_to_sleep,
     update_stillness, wake_islands,
 };
 use super::solve::{Interval, solve, substeps};
@@ -22,18 +22,6 @@ use std::time::Instant;
 use tryon_geometry::math::{P3, V3};
 use tryon_geometry::par;
 
-/// Range of time steps, s: shorter and longer ones are clamped.
-const DT_RANGE: [f64; 2] = [1e-4, 0.1];
-/// Time between two contact queries, s: at 3 m/s a limb moves 25 mm, half the reach of a query.
-const CONTACT_INTERVAL: f64 = 1.0 / 120.0;
-/// The same for a body slower than [`CALM_SPEED`].
-const CALM_INTERVAL: f64 = 1.0 / 60.0;
-/// m/s.
-const CALM_SPEED: f32 = 1.0;
-/// Share of an interval by which a step may be longer without another one: 1/30 s are two calm intervals.
-const INTERVAL_SLACK: f64 = 1e-3;
-/// Depth maps rendered a second, in turn: 15 of each direction. Twice as many cost time and keep cloth no higher.
-const MAPS_PER_SECOND: f64 = 60.0;
 /// Input of a step.
 #[derive(Clone, Copy, Debug)]
 pub struct Input<'a> {
@@ -134,25 +122,25 @@ impl<'a> AwakeStep<'a> {
     /// Stillness and motion of the body from `work.body.before` to the body of the state.
     fn begin(model: &'a Model, state: &'a mut State, work: &'a mut Workspace, dt: f64) -> Self {
         let (from, to) = (&work.body.before.vertices, state.body.vertices());
-        let deadband = model.config.noise_deadband;
-        let is_still = is_body_still(deadband, &state.sleep, &state.garments, to);
+        let (config, time) = (&model.config, &model.config.time);
+        let is_still = is_body_still(config, &state.sleep, &state.garments, to);
         // The mean: a waving hand is no teleport, and reskinning costs cloth its folds.
         let moved = from.iter().zip(to).map(|(a, b)| (a - b).norm());
         let mean = moved.map(f64::from).sum::<f64>() / to.len().max(1) as f64;
-        let teleported = mean > model.config.teleport;
-        let dt = dt.clamp(DT_RANGE[0], DT_RANGE[1]);
+        let teleported = mean > config.teleport;
+        let dt = dt.clamp(time.range[0], time.range[1]);
         let fastest = if teleported {
             0.0
         } else {
             let squares = from.iter().zip(to).map(|(a, b)| (a - b).norm_squared());
             squares.fold(0.0, f32::max).sqrt() / dt as f32
         };
-        let interval = if fastest < CALM_SPEED {
-            CALM_INTERVAL
+        let interval = if fastest < time.calm_speed {
+            time.calm_interval
         } else {
-            CONTACT_INTERVAL
+            time.contact_interval
         };
-        let intervals = (dt / interval - INTERVAL_SLACK).ceil().max(1.0) as usize;
+        let intervals = (dt / interval - time.interval_slack).ceil().max(1.0) as usize;
         state.frames += 1;
         let sleep = &mut state.sleep;
         sleep.still_time = if is_still { sleep.still_time + dt } else { 0.0 };
@@ -177,6 +165,7 @@ impl<'a> AwakeStep<'a> {
         let before = &mut work.body.before;
         if self.teleported {
             let teleport = Teleport {
+                joint_vertices: model.config.repair.joint_vertices,
                 weights: &model.weights,
                 joints: model.joints,
                 from: &before.vertices,
@@ -234,7 +223,7 @@ impl<'a> AwakeStep<'a> {
             },
             || {
                 let interior = body.refresh(&model.collision, collision);
-                skin_grid.fill(body.frame());
+                skin_grid.fill(model.collision.surface(), body.frame());
                 interior
             },
         );
@@ -250,7 +239,8 @@ impl<'a> AwakeStep<'a> {
         let wanted = if self.teleported {
             all.len()
         } else {
-            ((self.dt * MAPS_PER_SECOND).round() as usize).clamp(1, all.len())
+            ((self.dt * self.model.config.time.maps_per_second).round() as usize)
+                .clamp(1, all.len())
         };
         let turn = self.state.frames as usize % all.len().div_ceil(wanted);
         all.chunks(wanted).nth(turn).unwrap_or_default()
@@ -268,11 +258,11 @@ impl<'a> AwakeStep<'a> {
     }
 
     fn solve(&mut self) {
-        let sleep = self.model.config.sleep;
+        let (sleep, settings) = (self.model.config.sleep, &self.model.config.stillness);
         let still_time = self.state.sleep.still_time;
         let interval = Interval {
             span: self.span,
-            speed_limit: speed_limit(still_time).filter(|_| sleep),
+            speed_limit: settings.speed_limit_after(still_time).filter(|_| sleep),
         };
         let work = &mut *self.work;
         solve(self.model, &mut work.patches, &work.chunks, interval);

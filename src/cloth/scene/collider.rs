@@ -21,18 +21,6 @@ pub enum Primitive {
 }
 
 impl Primitive {
-    /// Bound of the displacement of any of its points between two placements (m).
-    pub fn max_displacement(&self, from: &Isometry3<f64>, to: &Isometry3<f64>) -> f64 {
-        let size = match self {
-            Self::Sphere { radius } => *radius,
-            Self::Capsule {
-                radius,
-                half_segment,
-            } => radius + half_segment,
-        };
-        let turn = from.rotation.angle_to(&to.rotation);
-        (from.translation.vector - to.translation.vector).norm() + turn * size
-    }
     /// Signed distance (negative inside) (m) and outward normal at a point of the solid's frame.
     pub fn distance(&self, p: &V3d) -> (f64, V3d) {
         let (radius, axis_point) = match self {

@@ -2,6 +2,7 @@
 
 use super::Collider;
 use crate::live::{ClothError, Config, Sheet};
+use crate::settings::SceneSettings;
 use tryon_formats::FormatError;
 use tryon_garment::Material;
 use tryon_geometry::math::{P3, V3d};
@@ -59,6 +60,8 @@ pub struct Scene {
     pub duration: f64,
     /// Frames a second of the output.
     pub rate: f64,
+    /// Settings of the live step.
+    pub settings: SceneSettings,
 }
 
 impl Scene {
@@ -75,14 +78,10 @@ impl Scene {
 
     /// Settings of the live solver: as many substeps as the fabric needs, cloth that never sleeps, hard and exact solids.
     pub fn config(&self) -> Config {
-        /// Distance that cloth keeps from solids (m): hides neither rounding nor a fabric's thickness.
-        const OFFSET: f64 = 5e-4;
-        /// Bound of the substeps in 1/60 s: beyond it a fabric is stiffer than any cloth.
-        const MOST_STEPS: usize = 10_000;
         Config {
             gravity: self.gravity.into(),
-            offset: OFFSET,
-            most_steps: MOST_STEPS,
+            offset: self.settings.offset,
+            most_steps: self.settings.most_steps,
             sleep: false,
             max_speed: f32::INFINITY,
             teleport: f64::INFINITY,

@@ -3,12 +3,13 @@
 use super::collider_file::ColliderFile;
 use super::description::{Scene, SceneError};
 use crate::live::Sheet;
+use crate::settings::SceneSettings;
 use serde::Deserialize;
 use std::path::Path;
 use tryon_formats::FormatError;
 use tryon_formats::obj::{parse_obj, read_obj};
 use tryon_garment::{IsotropicSolid, Material};
-use tryon_geometry::math::{P3, V3d};
+use tryon_geometry::math::V3d;
 use tryon_geometry::mesh::TriMesh;
 
 #[derive(Deserialize)]
@@ -100,6 +101,7 @@ pub fn parse(text: &str, origin: &Path, folder: Option<&Path>) -> Result<Scene, 
         gravity: V3d::from(file.gravity),
         duration: file.duration_s,
         rate: file.output_fps,
+        settings: SceneSettings::default(),
     })
 }
 
@@ -167,7 +169,7 @@ impl MaterialFile {
 /// Sheet whose rest shape is the mesh.
 fn sheet(mesh: &TriMesh, material: &Material) -> Result<Sheet, SceneError> {
     let rest: Vec<[[f64; 2]; 3]> = (0..mesh.faces().len())
-        .map(|f| flat(&mesh.corners(f)))
+        .map(|f| flat(mesh.corners(f).map(|p| p.coords.cast())))
         .collect();
     let (vertices, faces) = (mesh.vertices(), mesh.faces());
     Ok(Sheet::new(
@@ -180,8 +182,7 @@ fn sheet(mesh: &TriMesh, material: &Material) -> Result<Sheet, SceneError> {
 }
 
 /// A triangle laid flat: its first edge along x.
-fn flat(corners: &[P3; 3]) -> [[f64; 2]; 3] {
-    let [a, b, c] = corners.map(|p| p.coords.cast::<f64>());
+pub(super) fn flat([a, b, c]: [V3d; 3]) -> [[f64; 2]; 3] {
     let (e, d) = (b - a, c - a);
     let l = e.norm().max(f64::MIN_POSITIVE);
     let x = d.dot(&e) / l;

@@ -1,8 +1,9 @@
 //! Scenes by the offline solver: scene in, positions of every frame out.
 
 use super::Scene;
+use super::file::flat;
 use super::solids::Solids;
-use crate::elastic::{BendingModel, ClothModel, RestSheet};
+use crate::elastic::{ClothModel, RestSheet};
 use crate::fine::garment_cloth::fabric_of;
 use crate::fine::{
     AnimationProgress, ElasticTerm, FrameTargets, MotionState, OfflineCloth, OfflineError,
@@ -21,17 +22,6 @@ pub struct OfflineScene<'a> {
     solids: Solids<'a>,
 }
 
-/// A triangle laid flat, its first edge along u.
-fn flat(corners: [V3d; 3]) -> [Vector2<f64>; 3] {
-    let (e, d) = (corners[1] - corners[0], corners[2] - corners[0]);
-    let length = e.norm().max(f64::MIN_POSITIVE);
-    [
-        Vector2::zeros(),
-        Vector2::new(length, 0.0),
-        Vector2::new(d.dot(&e), e.cross(&d).norm()) / length,
-    ]
-}
-
 impl<'a> OfflineScene<'a> {
     /// Cloth and solids of a scene; the start is the rest shape.
     ///
@@ -39,14 +29,17 @@ impl<'a> OfflineScene<'a> {
     /// Names the face or modulus at fault.
     pub fn new(scene: &'a Scene) -> Result<Self, OfflineError> {
         let x: Vec<V3d> = scene.start.iter().map(|p| p.coords.cast()).collect();
-        let corners = scene.faces.iter().map(|f| flat(f.map(|v| x[v as usize])));
+        let corners = scene
+            .faces
+            .iter()
+            .map(|f| flat(f.map(|v| x[v as usize])).map(Vector2::from));
         let rest = RestSheet {
             faces: scene.faces.clone(),
             corners: corners.collect(),
             folded: Some(x.clone()),
         };
         let fabric = fabric_of(&scene.material);
-        let model = ClothModel::new(&rest, x.len(), fabric, BendingModel::default())?;
+        let model = ClothModel::new(&rest, x.len(), fabric)?;
         let mass = model.masses().to_vec();
         let terms = vec![Box::new(ElasticTerm::new(model)) as Box<_>];
         Ok(Self {
@@ -106,7 +99,7 @@ impl<'a> OfflineScene<'a> {
             .collect();
         solver.animate(
             interval,
-            (first, frames),
+            first + 1..=frames,
             |k| FrameTargets {
                 pins: &script[k].0,
                 obstacle: &script[k].1,

@@ -1,12 +1,12 @@
 //! Scenes by the live step: the sheet is a garment, the solids are its body, pins are anchors.
 
-use super::solid_mesh::LARGEST;
 use super::solids::Solids;
 use super::{Collider, Primitive, Scene, SceneError};
 use crate::contact::{CollisionModel, CollisionParts};
 use crate::live::{
     AnchorBinding, Arms, ClothError, Config, Input, Model, Outfit, State, Workspace, WornBody, step,
 };
+use crate::settings::SceneSettings;
 use nalgebra::{Isometry3, Point3};
 use serde::Serialize;
 use std::ops::ControlFlow;
@@ -19,11 +19,6 @@ use tryon_garment::{GarmentKind, GarmentMesh, Region, RenderMesh, Size};
 use tryon_geometry::math::order_statistics::{median, percentile};
 use tryon_geometry::math::{P3, V3d};
 use tryon_geometry::mesh::TriMesh;
-
-/// Longest step (s): frames further apart are divided, so that solids move evenly through each.
-const LONGEST_STEP: f64 = 1.0 / 60.0;
-/// Edge of the triangle that holds the pins (m). Shorter: pins far from it lose digits.
-const PIN_FRAME: f64 = 0.1;
 
 /// Report of a run.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
@@ -74,7 +69,7 @@ pub fn run(
     config: &Config,
     mut frame: impl FnMut(usize, &[P3]) -> ControlFlow<()>,
 ) -> Result<RunReport, SceneError> {
-    let mut live = LiveScene::new(scene, config.clone())?;
+    let mut live = LiveScene::new(scene, *config)?;
     let mut flow = frame(0, &scene.start);
     let mut times = Vec::new();
     for index in 1..scene.frames() {
@@ -128,7 +123,9 @@ impl<'a> LiveScene<'a> {
     /// Advances to frame `index` from the one before.
     fn advance(&mut self, index: usize) -> Result<(), SceneError> {
         let interval = 1.0 / self.scene.rate;
-        let count = (interval / LONGEST_STEP).ceil().max(1.0);
+        let count = (interval / self.scene.settings.longest_step)
+            .ceil()
+            .max(1.0);
         let dt = interval / count;
         self.report.substeps = 0;
         for k in 1..=count as usize {
@@ -186,7 +183,7 @@ struct SceneBody<'a> {
 impl<'a> SceneBody<'a> {
     fn new(scene: &'a Scene) -> Result<Self, SceneError> {
         for (number, collider) in scene.colliders.iter().enumerate() {
-            check_size(number, collider)?;
+            check_size(number, collider, &scene.settings)?;
         }
         let solids = Solids::new(scene);
         Ok(Self { scene, solids })
@@ -201,7 +198,8 @@ impl<'a> SceneBody<'a> {
     /// Vertices at time `t` (s), in the world (m).
     fn at(&self, t: f64) -> Vec<P3> {
         let carrier = self.carrier(t);
-        let corners = [V3d::zeros(), V3d::x() * PIN_FRAME, V3d::y() * PIN_FRAME];
+        let edge = self.scene.settings.pin_frame;
+        let corners = [V3d::zeros(), V3d::x() * edge, V3d::y() * edge];
         let corners = corners.map(|p| (carrier * Point3::from(p)).coords);
         let all = self.solids.at(t).into_iter().chain(corners);
         all.map(|p| P3::from(p.cast::<f32>())).collect()
@@ -210,9 +208,10 @@ impl<'a> SceneBody<'a> {
     /// Pins as anchors at the triangle.
     fn anchors(&self) -> Vec<AnchorBinding> {
         let (back, first) = (self.carrier(0.0).inverse(), self.solids.len() as u32);
+        let edge = self.scene.settings.pin_frame;
         let anchor = |v: &u32| {
             let local = back * self.scene.start[*v as usize].cast::<f64>();
-            let [x, y] = [local.x / PIN_FRAME, local.y / PIN_FRAME];
+            let [x, y] = [local.x / edge, local.y / edge];
             AnchorBinding {
                 vertex: *v,
                 body: [first, first + 1, first + 2],
@@ -250,7 +249,11 @@ impl<'a> SceneBody<'a> {
 }
 
 /// Checks that a solid is small enough for its mesh.
-fn check_size(number: usize, collider: &Collider) -> Result<(), ClothError> {
+fn check_size(
+    number: usize,
+    collider: &Collider,
+    settings: &SceneSettings,
+) -> Result<(), ClothError> {
     let [radius, half] = match collider.shape {
         Primitive::Sphere { radius } => [radius, 0.0],
         Primitive::Capsule {
@@ -258,10 +261,10 @@ fn check_size(number: usize, collider: &Collider) -> Result<(), ClothError> {
             half_segment,
         } => [radius, half_segment],
     };
-    if radius <= LARGEST[0] && half <= LARGEST[1] {
+    let (most, longest) = (settings.largest_radius, settings.largest_half);
+    if radius <= most && half <= longest {
         return Ok(());
     }
-    let [most, longest] = LARGEST;
     let why =
         format!("a radius of at most {most} m and half length of {longest} m are simulated live");
     Err(ClothError::Field {

@@ -1,21 +1,13 @@
 //! Triangle meshes of the scenes' solids.
 
 use super::Primitive;
+use crate::settings::SceneSettings;
 use std::f64::consts::PI;
 use tryon_geometry::math::V3d;
 use tryon_geometry::mesh::Face;
 
-/// Wanted length of edges (m): the chord of a sphere of 0.3 m then lies 0.2 mm below its surface, and live contact, which
-/// queries around the nearest vertex, finds the closest point.
-const EDGE: f64 = 0.02;
-/// Fewest and most segments around the axis, and most bands along a capsule's tube: solids beyond them have longer edges.
-const SEGMENTS: [f64; 2] = [32.0, 512.0];
-const MAX_BANDS: f64 = 256.0;
-/// Largest radius and half length whose edges are short enough for live contact (m).
-pub(super) const LARGEST: [f64; 2] = [2.0, 3.0];
-
 /// Surface of a solid in its own frame, y up, faces outwards (m).
-pub(super) fn solid_mesh(solid: &Primitive) -> (Vec<V3d>, Vec<Face>) {
+pub(super) fn solid_mesh(solid: &Primitive, settings: &SceneSettings) -> (Vec<V3d>, Vec<Face>) {
     let (radius, half) = match solid {
         Primitive::Sphere { radius } => (*radius, 0.0),
         Primitive::Capsule {
@@ -23,10 +15,13 @@ pub(super) fn solid_mesh(solid: &Primitive) -> (Vec<V3d>, Vec<Face>) {
             half_segment,
         } => (*radius, *half_segment),
     };
-    let quarter = (0.5 * PI * radius / EDGE).clamp(SEGMENTS[0] / 4.0, SEGMENTS[1] / 4.0);
+    let [fewest, most] = settings.segments.map(|n| n / 4.0);
+    let quarter = (0.5 * PI * radius / settings.edge).clamp(fewest, most);
     let quarter = quarter.ceil() as u32;
     let segments = 4 * quarter;
-    let rings = rings(radius, half, quarter);
+    let bands = (2.0 * half / settings.edge).ceil();
+    let bands = bands.min(settings.max_bands) as u32;
+    let rings = rings(radius, half, quarter, bands);
     let mut x = vec![V3d::new(0.0, -radius - half, 0.0)];
     for [height, across] in &rings {
         for k in 0..segments {
@@ -51,13 +46,13 @@ pub(super) fn solid_mesh(solid: &Primitive) -> (Vec<V3d>, Vec<Face>) {
     (x, faces)
 }
 
-/// Height and radius of each ring from pole to pole, without the poles (m); `quarter`: bands between pole and equator.
-fn rings(radius: f64, half: f64, quarter: u32) -> Vec<[f64; 2]> {
+/// Height and radius of each ring from pole to pole, without the poles (m); `quarter`: bands between pole and equator,
+/// `bands`: those along the tube.
+fn rings(radius: f64, half: f64, quarter: u32, bands: u32) -> Vec<[f64; 2]> {
     let ring = |centre: f64, k: f64| {
         let (sin, cos) = (0.5 * PI * k / f64::from(quarter)).sin_cos();
         [centre + radius * sin, radius * cos]
     };
-    let bands = (2.0 * half / EDGE).ceil().min(MAX_BANDS) as u32;
     let lower = (0..quarter).map(|k| ring(-half, f64::from(k + 1) - f64::from(quarter)));
     let tube = (1..bands).map(|k| [half * (2.0 * f64::from(k) / f64::from(bands) - 1.0), radius]);
     let upper = (u32::from(bands == 0)..quarter).map(|k| ring(half, f64::from(k)));
@@ -78,7 +73,7 @@ mod tests {
         let ball = |r: f64| 4.0 / 3.0 * PI * r.powi(3);
         let tube = PI * 0.12 * 0.12 * 0.9;
         for (solid, expected) in [(sphere, ball(0.3)), (capsule, ball(0.12) + tube)] {
-            let (x, faces) = solid_mesh(&solid);
+            let (x, faces) = solid_mesh(&solid, &SceneSettings::default());
             let [mut volume, mut euler] = [0.0, x.len() as f64];
             for f in &faces {
                 let [a, b, c] = f.map(|v| x[v as usize]);

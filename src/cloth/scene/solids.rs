@@ -21,7 +21,7 @@ impl<'a> Solids<'a> {
     pub(super) fn new(scene: &'a Scene) -> Self {
         let (mut points, mut faces) = (Vec::new(), Vec::new());
         for (number, collider) in scene.colliders.iter().enumerate() {
-            let (own, triangles) = solid_mesh(&collider.shape);
+            let (own, triangles) = solid_mesh(&collider.shape, &scene.settings);
             let first = points.len() as u32;
             faces.extend(triangles.iter().map(|f| f.map(|v| v + first)));
             points.extend(own.into_iter().map(|p| (p, number)));

@@ -6,7 +6,7 @@ use crate::CaptureError;
 use nalgebra::{Matrix3, Vector3};
 use std::sync::Arc;
 use tryon_geometry::linear::{
-    BlockJacobi, Factor, LinearError, StopCriterion, SymbolicFactor, SymmetricPattern,
+    BlockJacobi, CgSettings, Factor, LinearError, SymbolicFactor, SymmetricPattern,
     conjugate_gradient,
 };
 use tryon_geometry::math::P3;
@@ -50,8 +50,11 @@ pub(crate) enum PullPlace {
 /// Pull of one place to a target. At weight 0 its vertices are solved with those that are pulled.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Pull {
+    /// Place.
     pub(crate) at: PullPlace,
+    /// Weight of the squared distance.
     pub(crate) weight: f64,
+    /// Target, metres.
     pub(crate) target: P3,
 }
 
@@ -194,15 +197,14 @@ impl QuadraticEnergy {
         &self,
         x: &mut [P3],
         some: &[u32],
-        stop: StopCriterion,
+        stop: CgSettings,
         stage: &'static str,
     ) -> Result<(), CaptureError> {
         let mut system = self.restricted(x, some);
         let mut inverse = BlockJacobi::from_inverse(std::mem::take(&mut system.inverse));
         let mut moves = vec![Vector3::zeros(); some.len()];
         let apply = |from: &[Vector3<f64>], to: &mut [Vector3<f64>]| system.multiply(from, to);
-        let run = (Par::Seq, stop);
-        conjugate_gradient(apply, &mut inverse, &system.rhs, &mut moves, run);
+        conjugate_gradient(apply, &mut inverse, &system.rhs, &mut moves, stop);
         for (v, by) in some.iter().zip(&moves) {
             let moved = x[*v as usize].cast::<f64>() + by;
             if !moved.iter().all(|c| c.is_finite()) {
@@ -248,6 +250,7 @@ impl QuadraticEnergy {
 #[derive(Debug, Default)]
 struct RestrictedSystem {
     diagonal: Vec<f64>,
+    /// Preconditioner.
     inverse: Vec<Matrix3<f64>>,
     /// Column and value beside the diagonal, row after row.
     entries: Vec<(u32, f64)>,

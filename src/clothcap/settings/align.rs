@@ -2,7 +2,8 @@
 
 use super::settings;
 use serde::{Deserialize, Serialize};
-use tryon_geometry::linear::{CgAccuracy, StopCriterion};
+use tryon_geometry::linear::{CgAccuracy, CgSettings};
+use tryon_geometry::par::Par;
 
 /// Unknowns, kernel and length of one stage of the body model's fit.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -256,10 +257,11 @@ settings! {
 
 impl SurfaceFitSettings {
     /// End of a solve of some vertices.
-    pub(crate) fn stop(&self) -> StopCriterion {
-        StopCriterion {
+    pub(crate) fn stop(&self) -> CgSettings {
+        CgSettings {
             accuracy: CgAccuracy::Residual(self.residual),
             iterations: self.products,
+            par: Par::Seq,
         }
     }
 

@@ -6,8 +6,8 @@ use crate::settings::{HeldDownSettings, OutfitDrapeSettings};
 use crate::skin::Skin;
 use std::collections::BTreeSet;
 use tryon_cloth::contact::Part;
-use tryon_cloth::sleeve_rings::Sleeve;
-use tryon_cloth::untangler::Untangler;
+use tryon_cloth::sleeve_rings::{Sleeve, SleeveSettings};
+use tryon_cloth::untangler::{Untangler, UntanglerSettings};
 use tryon_cloth::{Hinge, Sheet};
 use tryon_garment::{GarmentError, GarmentMesh, Region};
 use tryon_geometry::math::order_statistics::percentile;
@@ -92,7 +92,7 @@ impl Drape {
             edges: edges_from_top(mesh, sheet, &x),
             hinges: sheet.hinges.iter().copied().filter(|h| h.w > 0.0).collect(),
             own,
-            sleeves: Sleeve::find(mesh, &sheet.edges),
+            sleeves: Sleeve::find(mesh, &sheet.edges, &SleeveSettings::default()),
             nearest: vec![[u32::MAX; 2]; n],
             planes: vec![[DrapePlane::default(); 2]; n],
             pinned: vec![None; n],
@@ -107,7 +107,11 @@ impl Drape {
         mesh: &GarmentMesh,
         sheet: &Sheet,
     ) -> Result<Self, GarmentError> {
-        self.untangler = Some(Untangler::new(&mesh.faces, &self.x));
+        self.untangler = Some(Untangler::new(
+            &mesh.faces,
+            &self.x,
+            UntanglerSettings::default(),
+        ));
         self.hood = Hood::new(mesh, sheet, self.settings.hood)?;
         Ok(self)
     }

@@ -2,7 +2,7 @@
 
 use super::context::DrapeContext;
 use super::state::Drape;
-use tryon_cloth::solver::xpbd::{project_distance, project_hinge};
+use tryon_cloth::solver::xpbd::{DistanceConstraint, project_hinge};
 use tryon_geometry::math::V3d;
 
 /// m/s².
@@ -63,8 +63,13 @@ impl Drape {
         for k in 0..n {
             let e = self.edges[if backwards { n - 1 - k } else { k }];
             let w = e.ends.map(|v| self.weight(v));
-            let compliance = e.compliance / (h * h);
-            project_distance(&mut self.x, e.ends, w, (e.rest, 0.0), compliance);
+            let edge = DistanceConstraint {
+                ends: e.ends,
+                length: e.rest,
+                least: 0.0,
+                compliance: e.compliance / (h * h),
+            };
+            edge.project(&mut self.x, w);
         }
     }
     fn project_hinges(&mut self, h: f64) {

@@ -2,8 +2,7 @@
 
 use super::context::DrapeContext;
 use super::state::{Drape, on_arms};
-use tryon_cloth::solver::xpbd::project_distance;
-use tryon_cloth::untangler::{UNTANGLE_GAP, UNTANGLE_STEP};
+use tryon_cloth::solver::xpbd::DistanceConstraint;
 use tryon_geometry::par::Par;
 
 impl Drape {
@@ -20,7 +19,7 @@ impl Drape {
         }
         let (pinned, inverse) = (&self.pinned, &self.inverse_mass);
         let weight = |i: usize| if pinned[i].is_some() { 0.0 } else { inverse[i] };
-        let r = untangler.iterate(Par::Rayon, &mut self.x, weight, UNTANGLE_STEP, UNTANGLE_GAP);
+        let r = untangler.iterate(Par::Rayon, &mut self.x, weight);
         self.crossings = r.intersections;
         for (i, (push, n)) in untangler.displacements.iter().enumerate() {
             self.before[i] += push;
@@ -86,7 +85,13 @@ impl Drape {
             let e = self.edges[k];
             let w = e.ends.map(|v| self.weight(v));
             let length = most * e.rest;
-            project_distance(&mut self.x, e.ends, w, (length, length), 0.0);
+            let edge = DistanceConstraint {
+                ends: e.ends,
+                length,
+                least: length,
+                compliance: 0.0,
+            };
+            edge.project(&mut self.x, w);
         }
     }
 }

@@ -275,7 +275,7 @@ fn principal_axes(spread: &Matrix3<f64>) -> [Vector3<f64>; 2] {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::linear::{BlockJacobi, CgAccuracy, StopCriterion, TwoLevel, conjugate_gradient};
+    use crate::linear::{BlockJacobi, CgAccuracy, CgSettings, TwoLevel, conjugate_gradient};
 
     /// Springs along a grid of n × n vertices, held softly; positions of its vertices.
     fn grid(n: usize) -> (BlockMatrix, Vec<Vector3<f64>>) {
@@ -310,20 +310,21 @@ mod tests {
             y.fill(Vector3::zeros());
             matrix.multiply_add(Par::Seq, x, y);
         };
-        let stop = StopCriterion {
+        let settings = CgSettings {
             accuracy: CgAccuracy::Residual(1e-9),
             iterations: 1000,
+            par: Par::Seq,
         };
         let mut one = vec![Vector3::zeros(); x.len()];
         let mut jacobi = BlockJacobi::new(Par::Seq, &[&matrix]);
-        let alone = conjugate_gradient(apply, &mut jacobi, &right, &mut one, (Par::Seq, stop));
+        let alone = conjugate_gradient(apply, &mut jacobi, &right, &mut one, settings);
         let mut coarse = CoarseSpace::new(matrix.pattern(), 48);
         coarse
             .update(Par::Seq, &x, &[&matrix])
             .expect("positive definite");
         let mut two = vec![Vector3::zeros(); x.len()];
         let mut levels = TwoLevel::new(BlockJacobi::new(Par::Seq, &[&matrix]), &mut coarse);
-        let both = conjugate_gradient(apply, &mut levels, &right, &mut two, (Par::Seq, stop));
+        let both = conjugate_gradient(apply, &mut levels, &right, &mut two, settings);
         assert!(2 * both.iterations < alone.iterations, "{both:?} {alone:?}");
         let apart = one.iter().zip(&two).map(|(a, b)| (a - b).norm());
         let size = one.iter().map(|a| a.norm()).fold(0.0, f64::max);

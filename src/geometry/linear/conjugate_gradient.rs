@@ -13,13 +13,15 @@ pub struct CgReport {
     pub relative_residual: f64,
 }
 
-/// End of an iteration, by what comes first.
+/// End of an iteration, by what comes first, and its threads.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct StopCriterion {
+pub struct CgSettings {
     /// Measure and its largest value.
     pub accuracy: CgAccuracy,
-    /// Products with the matrix.
+    /// Most products with the matrix.
     pub iterations: usize,
+    /// Threads; the bits do not depend on them.
+    pub par: Par,
 }
 
 /// Measure of a solution.
@@ -54,15 +56,16 @@ impl CgAccuracy {
     }
 }
 
-/// Solves `A x = b` from the initial `x` with a preconditioner; the bits do not depend on the threads.
+/// Solves `A x = b` from the initial `x` with a preconditioner.
 /// A search direction without positive curvature ends the iteration at the current `x`.
 pub fn conjugate_gradient(
     mut apply: impl FnMut(&[Vector3<f64>], &mut [Vector3<f64>]),
     preconditioner: &mut impl Preconditioner,
     b: &[Vector3<f64>],
     x: &mut [Vector3<f64>],
-    (par, stop): (Par, StopCriterion),
+    settings: CgSettings,
 ) -> CgReport {
+    let par = settings.par;
     let n = b.len();
     let mut ap = vec![Vector3::zeros(); n];
     apply(x, &mut ap);
@@ -78,7 +81,7 @@ pub fn conjugate_gradient(
         decrease: 0.0,
         last: 0.0,
     };
-    while at.products < stop.iterations && !stop.accuracy.is_reached(&at) {
+    while at.products < settings.iterations && !settings.accuracy.is_reached(&at) {
         apply(&p, &mut ap);
         at.products += 1;
         let curvature = dot(par, &p, &ap);
@@ -153,12 +156,13 @@ mod tests {
         let b: Vec<_> = (0..n).map(|i| Vector3::x() * load(i)).collect();
         let decrease = |accuracy| {
             let mut x = vec![Vector3::zeros(); n];
-            let stop = StopCriterion {
+            let settings = CgSettings {
                 accuracy,
                 iterations: 10 * n,
+                par: Par::Seq,
             };
             let mut halves = BlockJacobi::from_inverse(vec![Matrix3::identity() / 2.0; n]);
-            conjugate_gradient(apply, &mut halves, &b, &mut x, (Par::Seq, stop));
+            conjugate_gradient(apply, &mut halves, &b, &mut x, settings);
             let mut forces = vec![Vector3::zeros(); n];
             apply(&x, &mut forces);
             let at = |k: usize| (b[k] - forces[k] * 0.5).dot(&x[k]);
@@ -187,12 +191,13 @@ mod tests {
         };
         let b: Vec<_> = (0..n).map(|i| Vector3::new(1.0, i as f64, -0.5)).collect();
         let mut x = vec![Vector3::zeros(); n];
-        let stop = StopCriterion {
+        let settings = CgSettings {
             accuracy: CgAccuracy::Residual(1e-12),
             iterations: 3 * n,
+            par: Par::Seq,
         };
         let mut inverse = BlockJacobi::from_inverse(vec![Matrix3::identity() / 2.5; n]);
-        let report = conjugate_gradient(apply, &mut inverse, &b, &mut x, (Par::Seq, stop));
+        let report = conjugate_gradient(apply, &mut inverse, &b, &mut x, settings);
         assert!(
             report.relative_residual < 1e-11 && report.iterations <= 3 * n,
             "{report:?}"

@@ -12,7 +12,7 @@ mod single_matrix;
 pub use block_matrix::{BlockMatrix, BlockPattern};
 pub use cholesky::{Factor, SymbolicFactor};
 pub use coarse_space::CoarseSpace;
-pub use conjugate_gradient::{CgAccuracy, CgReport, StopCriterion, conjugate_gradient};
+pub use conjugate_gradient::{CgAccuracy, CgReport, CgSettings, conjugate_gradient};
 pub use pattern::SymmetricPattern;
 pub use preconditioner::{BlockJacobi, Preconditioner, TwoLevel};
 pub use row_selection::RowSelection;

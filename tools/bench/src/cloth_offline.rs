@@ -1,10 +1,10 @@
-//! Offline solver on the standard scenes: time schemes, linear solvers, steps and resolutions against reference positions.
+//! Offline solver on the standard scenes: time schemes, steps and resolutions against reference positions.
 
 use super::cloth::{reference, reference_errors};
 use super::{EvaluateError, Row, Table};
 use std::ops::ControlFlow;
 use std::path::Path;
-use tryon_cloth::fine::{LinearMethod, OfflineFrameReport, OfflineSettings, TimeScheme};
+use tryon_cloth::fine::{OfflineFrameReport, OfflineSettings, TimeScheme};
 use tryon_cloth::scene::{OfflineScene, Scene, load};
 use tryon_geometry::math::P3;
 use tryon_geometry::math::order_statistics::median;
@@ -24,34 +24,28 @@ pub struct OfflineBench {
 /// Scenes measured: files of the scenes folder without extension.
 pub const SCENES: [&str; 4] = ["A_pin_1k", "A_pin_5k", "B_sphere_1k", "C_skirt_1k"];
 
-/// Settings of the offline solver.
+/// A time scheme and the steps a second.
 #[derive(Clone, Copy)]
 struct OfflineVariant {
     scheme: TimeScheme,
-    linear: LinearMethod,
     /// Steps a second; `None`: as the error allows.
     steps: Option<u32>,
 }
 
 /// Variants measured, the defaults first.
 const VARIANTS: [OfflineVariant; 7] = {
-    use LinearMethod::{Cholesky, ConjugateGradient, TwoLevel};
     use TimeScheme::{Bdf2, ImplicitEuler};
-    const fn of(scheme: TimeScheme, linear: LinearMethod, steps: Option<u32>) -> OfflineVariant {
-        OfflineVariant {
-            scheme,
-            linear,
-            steps,
-        }
+    const fn of(scheme: TimeScheme, steps: Option<u32>) -> OfflineVariant {
+        OfflineVariant { scheme, steps }
     }
     [
-        of(Bdf2, TwoLevel, None),
-        of(Bdf2, TwoLevel, Some(120)),
-        of(Bdf2, TwoLevel, Some(240)),
-        of(Bdf2, TwoLevel, Some(480)),
-        of(Bdf2, Cholesky, Some(240)),
-        of(ImplicitEuler, TwoLevel, Some(480)),
-        of(Bdf2, ConjugateGradient, None),
+        of(Bdf2, None),
+        of(Bdf2, Some(120)),
+        of(Bdf2, Some(240)),
+        of(Bdf2, Some(480)),
+        of(ImplicitEuler, Some(120)),
+        of(ImplicitEuler, Some(240)),
+        of(ImplicitEuler, Some(480)),
     ]
 };
 /// Scenes with more vertices than this run the defaults alone unless asked for.
@@ -64,16 +58,8 @@ impl OfflineVariant {
             TimeScheme::Bdf2 => "BDF2",
             TimeScheme::ImplicitEuler => "implicit Euler",
         };
-        let linear = match self.linear {
-            LinearMethod::TwoLevel => "two levels",
-            LinearMethod::ConjugateGradient => "conjugate gradients",
-            LinearMethod::Cholesky => "Cholesky",
-        };
-        let steps = match self.steps {
-            Some(_) => "",
-            None => ", adaptive",
-        };
-        format!("{scheme}, {linear}{steps}")
+        let steps = self.steps.map_or(", adaptive", |_| "");
+        format!("{scheme}{steps}")
     }
 
     fn settings(&self) -> OfflineSettings {
@@ -81,7 +67,6 @@ impl OfflineVariant {
             scheme: self.scheme,
             ..OfflineSettings::default()
         };
-        settings.newton.linear = self.linear;
         if let Some(steps) = self.steps {
             settings.longest_step = 1.0 / f64::from(steps);
             settings.error_rate = f64::INFINITY;
@@ -202,6 +187,6 @@ mod tests {
         assert!(fixed.error_rate.is_infinite());
         assert!((fixed.longest_step - 1.0 / 480.0).abs() < 1e-12);
         assert_eq!(VARIANTS[0].settings(), OfflineSettings::default());
-        assert_eq!(VARIANTS[0].name(), "BDF2, two levels, adaptive");
+        assert_eq!(VARIANTS[0].name(), "BDF2, adaptive");
     }
 }

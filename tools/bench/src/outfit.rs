@@ -30,7 +30,7 @@ impl OutfitSpec {
         let patterns = self.garments.iter().map(pattern);
         let patterns = patterns.collect::<Result<Vec<_>, _>>()?;
         let mut options = DressOptions {
-            config: self.config.clone(),
+            config: self.config,
             ..DressOptions::default()
         };
         options.triangulation.edge_length = self.edge;

@@ -120,7 +120,7 @@ impl RestingSubject {
         steps: usize,
         noise: f32,
     ) -> Result<RestReport, EvaluateError> {
-        let before = self.dressed.model.replace_config(config.clone());
+        let before = self.dressed.model.replace_config(*config);
         let mut state: State = self.dressed.state.clone();
         let (mut work, mut report) = (Workspace::default(), RestReport::default());
         let dt = 1.0 / f64::from(RATE);

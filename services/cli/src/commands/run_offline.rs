@@ -4,7 +4,7 @@ use super::export::SKIN;
 use crate::args::RunArgs;
 use crate::input;
 use crate::interrupt::INTERRUPTED;
-use crate::offline_files::{OfflineFiles, saved_state};
+use crate::offline_files::{OfflineFiles, VertexCounts, saved_state};
 use crate::preview::{Preview, PreviewFrame};
 use crate::report::{GarmentPart, garment_parts, peak_memory, write};
 use anyhow::{Context, Result, bail};
@@ -197,8 +197,11 @@ impl<'a> Animation<'a> {
         let resumed = known.unwrap_or(0) as usize;
         let frames = known.map_or(0, |_| resumed + 1);
         let body = preview.mirror.template().mesh().vertices().len();
-        let counts = (outfit.cloth().len(), Some(body));
-        let files = OfflineFiles::open(&args.solver, &args.out, counts, frames)?;
+        let vertices = VertexCounts {
+            cloth: outfit.cloth().len(),
+            body: Some(body),
+        };
+        let files = OfflineFiles::open(&args.solver, &args.out, vertices, frames)?;
         let simulation = match &saved {
             Some(bytes) => OfflineRun::resumed(outfit, bytes, Par::Rayon)?,
             None => {

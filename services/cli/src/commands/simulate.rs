@@ -3,7 +3,7 @@
 use crate::args::SimulateArgs;
 use crate::input;
 use crate::interrupt::INTERRUPTED;
-use crate::offline_files::{OfflineFiles, saved_state};
+use crate::offline_files::{OfflineFiles, VertexCounts, saved_state};
 use crate::report::write;
 use anyhow::Result;
 use serde::Serialize;
@@ -72,8 +72,11 @@ fn offline(args: &SimulateArgs, scene: &Scene) -> Result<ExitCode> {
     let offline = OfflineScene::new(scene)?;
     let resumed = saved.as_deref().map_or(Ok(0), checkpoint_frame)? as usize;
     let known = saved.as_ref().map_or(0, |_| resumed + 1);
-    let counts = (scene.start.len(), None);
-    let mut files = OfflineFiles::open(&args.solver, &args.out, counts, known)?;
+    let vertices = VertexCounts {
+        cloth: scene.start.len(),
+        body: None,
+    };
+    let mut files = OfflineFiles::open(&args.solver, &args.out, vertices, known)?;
     if saved.is_none() {
         files.push(&scene.start, &[])?;
     }

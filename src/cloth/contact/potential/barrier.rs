@@ -18,44 +18,7 @@ pub struct Barrier {
     pub thickness: f64,
 }
 
-/// Scales of a scene, from which [`Barrier::proposed`] derives a stiffness.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct BarrierScale {
-    /// m: mean mass of a cloth vertex (kg).
-    pub vertex_mass: f64,
-    /// h: time step (s).
-    pub time_step: f64,
-    /// Mean length of the edges (m).
-    pub mean_edge: f64,
-    /// a: acceleration that one contact must resist (m/s²), gravity times the layers that lie on it.
-    pub acceleration: f64,
-}
-
-/// Largest share of the mean edge that the barrier may extend over: beyond, contacts of a vertex overlap with those of its
-/// neighbours, and a fold touches itself around the corner.
-const ACTIVATION_OVER_EDGE: f64 = 0.1;
-/// Curvature at half of the activation, in units of m / h². Larger values shorten the steps, smaller ones narrow the gaps.
-const CURVATURE_OVER_INERTIA: f64 = 10.0;
-
 impl Barrier {
-    /// Barrier of a thickness (m) with the activation (m) asked for, or a tenth of the mean edge if that is less.
-    ///
-    /// With E₁ = the barrier of κ = 1 at half of the activation: κ = max(10 (m / h²) / E₁″, m a / |E₁′|). The first keeps
-    /// Newton's matrix balanced, the second carries the load at half of the activation or more.
-    pub fn proposed(scale: &BarrierScale, activation: f64, thickness: f64) -> Self {
-        let mut barrier = Self {
-            stiffness: 1.0,
-            activation: activation.min(ACTIVATION_OVER_EDGE * scale.mean_edge),
-            thickness,
-        };
-        let half = thickness + 0.5 * barrier.activation;
-        let unit = barrier.sample(half * half);
-        let inertia = scale.vertex_mass / (scale.time_step * scale.time_step);
-        let balanced = CURVATURE_OVER_INERTIA * inertia / unit.along(half * half);
-        let carrying = scale.vertex_mass * scale.acceleration / (-2.0 * unit.first * half);
-        barrier.stiffness = balanced.max(carrying);
-        barrier
-    }
     /// Distance at which the barrier begins, ξ + d̂ (m).
     pub fn reach(&self) -> f64 {
         self.thickness + self.activation

@@ -9,6 +9,6 @@ mod mollified;
 mod tests;
 
 pub use assembly::{ContactAssembly, ContactElement};
-pub use barrier::{Barrier, BarrierScale};
+pub use barrier::Barrier;
 pub use composition::{BarrierSample, Curvature};
 pub use friction::{Friction, FrictionPair};

@@ -147,32 +147,3 @@ fn stencils_outside_of_the_domain_stay_finite_or_say_infinity() {
     let e = e.expect("within reach");
     assert!(e.value == 0.0 && e.gradient.norm() < 1e-12 && e.hessian.iter().all(|h| h.is_finite()));
 }
-
-#[test]
-fn proposed_stiffness_carries_the_load_at_half_of_the_activation() {
-    let scale = BarrierScale {
-        vertex_mass: 1e-4,
-        time_step: 1.0 / 60.0,
-        mean_edge: 0.01,
-        acceleration: 9.81,
-    };
-    let barrier = Barrier::proposed(&scale, 5e-3, 2e-4);
-    assert!((barrier.activation - 1e-3).abs() < 1e-15);
-    let force = |b: &Barrier, d: f64| -2.0 * d * b.sample(d * d).first;
-    assert!(force(&barrier, 7e-4) >= 9.81e-4 * (1.0 - 1e-12));
-    // Short steps: ten times the inertia is the larger.
-    let short = BarrierScale {
-        time_step: 1e-3,
-        ..scale
-    };
-    let stiff = Barrier::proposed(&short, 5e-3, 2e-4);
-    let curvature = stiff.sample(4.9e-7).along(4.9e-7);
-    assert!((curvature - 10.0 * 1e-4 / 1e-6).abs() < 1e-9 * curvature);
-    // Heavy loads: the weight is the larger.
-    let heavy = BarrierScale {
-        acceleration: 1e4,
-        ..scale
-    };
-    let loaded = Barrier::proposed(&heavy, 5e-3, 2e-4);
-    assert!((force(&loaded, 7e-4) - 1.0).abs() < 1e-9);
-}

@@ -5,9 +5,6 @@ use crate::live::outfit_model::Model;
 use crate::live::patch::{PatchWork, v4};
 use crate::live::solver::explicit::Pin;
 
-/// Rate at which anchors of strength ½ approach their target, 1/s.
-const ANCHOR_RATE: f64 = 120.0;
-
 /// Pins of a patch's anchors, which move with the body through an interval. What sleeps is pinned too.
 pub(in crate::live) fn pin_anchors(
     model: &Model,
@@ -19,7 +16,7 @@ pub(in crate::live) fn pin_anchors(
     p.pins.clear();
     p.pinned.clear();
     p.pinned.extend_from_slice(&p.asleep);
-    let h = model.garments[garment].h;
+    let (h, rate) = (model.garments[garment].h, model.config.contact.anchor_rate);
     for (local, a) in model.anchors_of(garment, patch) {
         if a.strength <= 0.0 || p.asleep[local as usize] {
             continue;
@@ -29,7 +26,7 @@ pub(in crate::live) fn pin_anchors(
         let stiffness = if a.strength >= 1.0 {
             1.0
         } else {
-            1.0 - (-h * ANCHOR_RATE * a.strength / (1.0 - a.strength)).exp()
+            1.0 - (-h * rate * a.strength / (1.0 - a.strength)).exp()
         };
         p.pinned[local as usize] = a.strength >= 1.0;
         p.pins.push(Pin {

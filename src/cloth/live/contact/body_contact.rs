@@ -11,12 +11,6 @@ use crate::live::state::GarmentState;
 use tryon_garment::Region;
 use tryon_geometry::math::{P3, V3};
 
-/// Largest distance at which skin is queried in an interval, metres.
-const MAX_REACH: f32 = 0.04;
-/// Clearance between two body parts below which cloth keeps to its own half, metres, and its distance from the middle.
-const SHARED_GAP: f32 = 0.03;
-const MIDDLE_GAP: f32 = 0.00125;
-
 /// The body during one interval, and what its contact generation reads.
 pub(in crate::live) struct BodyContacts<'a> {
     pub(in crate::live) model: &'a Model,
@@ -117,7 +111,7 @@ impl BodyContacts<'_> {
         }
         let surface = self.surface();
         let reach = self.model.config.reach as f32;
-        let wanted = (q.max_offset + reach + q.travel).min(MAX_REACH);
+        let wanted = (q.max_offset + reach + q.travel).min(self.model.config.contact.max_reach);
         let around = g.self_contact.surface.neighbours(q.v).iter();
         let nearest = &self.garments[c.garment].nearest;
         let starts = around.map(|w| nearest[*w as usize][side]);
@@ -166,7 +160,8 @@ impl BodyContacts<'_> {
         let corners = self.surface().faces()[own.face as usize];
         let raised = self.layer_heights.offset_over(c.garment, corners, q.offset);
         let gap = found[1].and_then(|other| own.clearance_to(&other));
-        let Some(gap) = gap.filter(|gap| *gap < SHARED_GAP) else {
+        let settings = &self.model.config.contact;
+        let Some(gap) = gap.filter(|gap| *gap < settings.shared_gap) else {
             return (found, [raised, q.offset]);
         };
         c.report.pinched += usize::from(gap < 2.0 * q.offset);
@@ -175,7 +170,7 @@ impl BodyContacts<'_> {
             return ([None, None], [q.offset; 2]);
         }
         let half = 0.5 * gap;
-        let middle = MIDDLE_GAP.min(0.5 * half);
+        let middle = settings.middle_gap.min(0.5 * half);
         (found, [q.offset.min(half - middle), half + middle])
     }
 

@@ -11,15 +11,6 @@ use crate::live::patch::PatchWork;
 use tryon_geometry::math::{P3, V3};
 use tryon_geometry::par::{self, Par};
 
-/// Distance outside a vertex within which an outer layer constrains it, metres.
-const LAYER_REACH: f32 = 0.02;
-/// Distance between layers, metres: no more than between two of them on the skin.
-const LAYER_GAP: f32 = 0.002;
-/// Distance outside an outer layer beyond which it is unrelated (a sleeve, the other side), metres.
-const LAYER_DEPTH: f32 = 0.15;
-/// Distance below a hem within which an inner layer may stand out as far, metres: an edge of a triangle.
-const HEM: f32 = 0.03;
-
 /// Garments at the beginning of an interval.
 pub(in crate::live) struct ClothContacts<'a> {
     pub(in crate::live) model: &'a Model,
@@ -106,6 +97,12 @@ impl ClothContacts<'_> {
 
     fn with_layers(&self, p: &PatchWork, c: &mut ContactChunk) {
         let (m, f) = c.model(self.model);
+        let settings = &self.model.config.contact;
+        let (reach, depth, gap) = (
+            settings.layer_reach,
+            settings.layer_depth,
+            settings.layer_gap,
+        );
         for (j, i) in c.range.clone().enumerate() {
             if p.pinned[i] || c.released[j] {
                 continue;
@@ -114,24 +111,27 @@ impl ClothContacts<'_> {
             // A skirt lies under the trunk of a shirt, never under its sleeves.
             let own = m.own[f.vertices[i] as usize];
             for outer in c.garment + 1..self.model.garments.len() {
-                let (g, s) = (
-                    &self.model.garments[outer].self_contact.surface,
+                let (sheet, s) = (
+                    &self.model.garments[outer].self_contact,
                     &self.sheets[outer],
                 );
+                let g = &sheet.surface;
                 let start = c.layers[outer][j];
                 let extent = SearchExtent {
                     mask: own,
-                    reach: LAYER_DEPTH,
+                    reach: depth,
                 };
                 let (near, hit) = g.closest_within(&s.surface, &x, start, extent);
                 c.layers[outer][j] = near;
-                let cover = hit.ok().and_then(|hit| g.cover(&s.surface, &x, &hit, HEM));
+                let cover = hit
+                    .ok()
+                    .and_then(|hit| g.cover(&s.surface, &x, &hit, settings.hem));
                 let Some(cover) = cover else { continue };
                 let inside = -cover.signed_distance;
-                if inside < LAYER_REACH && inside > -LAYER_DEPTH {
+                if inside < reach && inside > -depth {
                     c.cloth_planes
-                        .push(s.contact_plane(g, i, &cover, -1.0, LAYER_GAP));
-                    c.report.cloth_contacts += usize::from(inside < LAYER_GAP);
+                        .push(s.contact_plane(sheet, i, &cover, -1.0, gap));
+                    c.report.cloth_contacts += usize::from(inside < gap);
                 }
             }
         }

@@ -5,6 +5,7 @@
 
 use crate::contact::{ClosestPoint, SurfaceFrame, SurfaceModel};
 use crate::live::solver::explicit::{ContactPlane, V4};
+pub use crate::settings::SelfContactSettings;
 use tryon_geometry::math::order_statistics::percentile;
 use tryon_geometry::math::{P3, V3};
 use tryon_geometry::mesh::Csr;
@@ -12,20 +13,6 @@ use tryon_geometry::par::Par;
 use tryon_geometry::spatial::HashGrid;
 use wide::f32x4;
 
-/// Largest closing speed of folds, m/s.
-pub const CLOSING: f32 = 1.0;
-/// Largest distance of a contact, metres: the motion of an interval of 8 ms. With 11 mm in a dance and 20 mm while dressing
-/// folds hold each other over air, and a skirt tears (stretch 176 % instead of 7 %).
-const MAX_REACH: f32 = 0.01;
-/// The same in edge lengths: the third ring, the first that counts as another fold, lies farther away unless a fold is
-/// sharper than the mesh resolves.
-const REACH_EDGES: f32 = 0.85;
-/// Largest thickness between folds, in edge lengths; more holds sharp folds open.
-const THICKNESS_EDGES: f32 = 0.25;
-/// Margin of the candidate query beyond need, in edge lengths: motion until the next query.
-const MARGIN_EDGES: f32 = 0.75;
-/// Friction of cloth on cloth: below the measured 0.3, as planes renewed every interval resist sliding already.
-pub const FRICTION: f32 = 0.1;
 /// Smoothing iterations of velocities before they are extrapolated through an interval. Unsmoothed, a dancer's skirt shakes
 /// itself apart (stretch 243 %; with one iteration 12.6 %, with two 8.7 %, as without self-contact).
 const SMOOTHING: usize = 2;
@@ -41,6 +28,7 @@ pub struct SelfContactModel {
     excluded: Csr,
     /// 95th percentile of the edge lengths, metres.
     edge: f32,
+    settings: SelfContactSettings,
 }
 
 /// Positions and velocities of a sheet at a contact query.
@@ -69,12 +57,13 @@ impl SelfContactFrame {
     /// Plane of vertex `i`, `gap` metres from a closest point on its `side`, with the velocity of its triangle.
     pub fn contact_plane(
         &self,
-        g: &SurfaceModel,
+        model: &SelfContactModel,
         i: usize,
         hit: &ClosestPoint,
         side: f32,
         gap: f32,
     ) -> ContactPlane {
+        let g = &model.surface;
         let corners = g.faces()[hit.face as usize];
         let velocity = (0..3).fold(V3::zeros(), |a, k| {
             a + self.velocity(g, corners[k]) * hit.weights[k]
@@ -85,7 +74,7 @@ impl SelfContactFrame {
             normal: V4::new(n.x, n.y, n.z),
             offset: n.dot(&hit.point.coords) + gap,
             velocity: V4::new(velocity.x, velocity.y, velocity.z),
-            friction: FRICTION,
+            friction: model.settings.friction,
         }
     }
 }
@@ -127,12 +116,17 @@ pub struct Search {
 
 impl SelfContactModel {
     /// Takes the sheet as a surface and the lengths of its edges.
-    pub fn new(surface: SurfaceModel, lengths: impl Iterator<Item = f32>) -> Self {
+    pub fn new(
+        surface: SurfaceModel,
+        lengths: impl Iterator<Item = f32>,
+        settings: SelfContactSettings,
+    ) -> Self {
         let mut lengths: Vec<f32> = lengths.collect();
         Self {
             excluded: surface.second_neighbours(),
             surface,
             edge: percentile(&mut lengths, 95).unwrap_or(0.0),
+            settings,
         }
     }
     /// 95th percentile of the edge lengths, metres.
@@ -141,26 +135,28 @@ impl SelfContactModel {
     }
     /// Query in worn garments, whose planes last for `span` seconds.
     pub fn search(&self, thickness: f32, span: f32) -> Search {
-        let reach = (thickness + CLOSING * span)
-            .min(MAX_REACH)
-            .min(REACH_EDGES * self.edge);
+        let s = &self.settings;
+        let reach = (thickness + s.closing * span)
+            .min(s.max_reach)
+            .min(s.reach_edges * self.edge);
         Search {
             halfway: false,
-            ..self.with_reach(thickness, reach, CLOSING * span)
+            ..self.with_reach(thickness, reach, s.closing * span)
         }
     }
     /// Query of a sheet whose points approach each other by at most `motion` metres until the next one.
     pub fn search_all(&self, thickness: f32, motion: f32) -> Search {
+        let s = &self.settings;
         self.with_reach(
             thickness,
-            (thickness + motion).min(REACH_EDGES * self.edge),
-            MARGIN_EDGES * self.edge,
+            (thickness + motion).min(s.reach_edges * self.edge),
+            s.margin_edges * self.edge,
         )
     }
     fn with_reach(&self, thickness: f32, reach: f32, margin: f32) -> Search {
         // The nearest corner of an equilateral triangle is at most its circumradius beside the closest point.
         let beside = self.edge / 3f32.sqrt();
-        let thickness = thickness.min(THICKNESS_EDGES * self.edge);
+        let thickness = thickness.min(self.settings.thickness_edges * self.edge);
         Search {
             thickness,
             reach,
@@ -265,7 +261,7 @@ impl SelfContactModel {
             true => search.thickness,
             false => far,
         };
-        let mut plane = frame.contact_plane(g, i, hit, side, gap);
+        let mut plane = frame.contact_plane(self, i, hit, side, gap);
         let own = frame.velocity(g, v);
         let own = V4::new(own.x, own.y, own.z);
         plane.velocity = (plane.velocity + own).scale(0.5);

@@ -6,11 +6,6 @@ use crate::live::outfit_model::Model;
 use crate::live::patch::{PatchWork, v4};
 use tryon_geometry::math::P3;
 
-/// Height above the skin to which cloth is projected, metres: less than a fabric's thickness.
-const HEIGHT: f32 = 5e-4;
-/// Depth in another body part beyond which cloth stays, metres: it may have come from the other side.
-const MAX_OTHER_DEPTH: f32 = 0.01;
-
 /// The body at the end of a step.
 pub(in crate::live) struct SkinProjection<'a> {
     pub(in crate::live) model: &'a Model,
@@ -53,6 +48,8 @@ impl SkinProjection<'_> {
         is_constrained: bool,
     ) {
         let (surface, skin) = (self.surface(), self.skin());
+        let settings = &self.model.config.contact;
+        let (height, max_other) = (settings.projected_height, settings.max_other_depth);
         let candidates = |x: &P3| self.grid.candidates(surface, skin, x, masks);
         let mut x = p.position(i);
         let mut near = candidates(&x);
@@ -64,7 +61,7 @@ impl SkinProjection<'_> {
         // Its own parts have the last word.
         for side in [1, 0].into_iter().filter(|s| masks[*s] != 0) {
             // Skin of other parts is far from most cloth.
-            let reach = if side == 1 { MAX_OTHER_DEPTH } else { f32::MAX };
+            let reach = if side == 1 { max_other } else { f32::MAX };
             let extent = SearchExtent {
                 mask: masks[side],
                 reach,
@@ -75,8 +72,8 @@ impl SkinProjection<'_> {
             let Some(hit) = found else { continue };
             let depth = -hit.signed_distance;
             if hit.on_part_boundary
-                || hit.signed_distance >= HEIGHT
-                || side == 1 && depth > MAX_OTHER_DEPTH
+                || hit.signed_distance >= height
+                || side == 1 && depth > max_other
                 || self
                     .body
                     .interior()
@@ -85,7 +82,7 @@ impl SkinProjection<'_> {
                 continue;
             }
             c.report.penetration = c.report.penetration.max(f64::from(depth));
-            let moved = v4(&(hit.point + hit.normal * HEIGHT - p.motion.start[i].point()));
+            let moved = v4(&(hit.point + hit.normal * height - p.motion.start[i].point()));
             c.projected.push((i as u32, moved));
             x = (p.motion.start[i] + moved).point();
             let left = surface.closest(skin, &x, hit.vertex, masks[side]);

@@ -115,6 +115,7 @@ impl WornReference {
 
 fn teleport<'a>(model: &'a Model, from: &'a [P3], to: &'a [P3]) -> Teleport<'a> {
     Teleport {
+        joint_vertices: model.config.repair.joint_vertices,
         weights: &model.weights,
         joints: model.joints,
         from,

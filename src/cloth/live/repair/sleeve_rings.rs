@@ -3,6 +3,7 @@
 //! Contact knows the nearest skin only. An arm that passes through its sleeve in one step finds all cloth outside, on one
 //! side. A ring of cloth tells: it encloses the centre line of the arm, or it is moved rigidly to where it does.
 
+pub use crate::settings::SleeveSettings;
 use nalgebra::{Isometry3, Translation3, UnitQuaternion};
 use tryon_body::Template;
 use tryon_garment::{GarmentMesh, Region};
@@ -10,26 +11,12 @@ use tryon_geometry::math::order_statistics::{median, percentile};
 use tryon_geometry::math::{P3, V3};
 use tryon_geometry::mesh::distances;
 
-/// Distance between two rings of skin, metres.
-const SKIN_RING: f64 = 0.02;
-/// Width of a ring of cloth, metres, and its least width in edge lengths: narrower ones have gaps.
-const RING: f32 = 0.04;
-const RING_EDGES: f32 = 1.2;
 /// Least vertices of a ring.
 const MIN_VERTICES: usize = 6;
 /// Directions around the arm.
 const SECTORS: usize = 36;
 /// Adjacent sectors without cloth from which on the arm is lost: 200°.
 const LOST_SECTORS: usize = 20;
-/// Largest distance of the armhole from the shoulder along the arm, metres.
-const ARMHOLE: f32 = 0.3;
-/// Largest distance of the next ring along the arm, and that of a recovered one, in distances on the cloth.
-const MAX_SPACING: f32 = 1.5;
-const RECOVERED_SPACING: f32 = 0.9;
-/// Half the length over which the direction of an arm is taken, metres.
-const DIRECTION: f32 = 0.03;
-/// Step of the scan for the nearest point of a centre line, metres.
-const SCAN: f32 = 0.005;
 /// Percentage of edges that are at most as long as the length a ring must exceed.
 const EDGE_PERCENTILE: usize = 95;
 /// Left and right arm.
@@ -37,11 +24,14 @@ const ARMS: [Region; 2] = [Region::LEFT_ARM, Region::RIGHT_ARM];
 
 /// Rings of skin along both arms, from the shoulder to the finger tips.
 #[derive(Debug, Default)]
-pub struct Arms([Vec<Vec<u32>>; 2]);
+pub struct Arms {
+    rings: [Vec<Vec<u32>>; 2],
+    settings: SleeveSettings,
+}
 
 impl Arms {
     /// Rings of a body whose vertices belong to these `parts`.
-    pub fn new(template: &Template, parts: &[u8]) -> Self {
+    pub fn new(template: &Template, parts: &[u8], settings: SleeveSettings) -> Self {
         let at = template.mesh().vertices();
         let edges: Vec<([u32; 2], f64)> = template
             .topology()
@@ -54,7 +44,7 @@ impl Arms {
                 )
             })
             .collect();
-        Self(ARMS.map(|arm| {
+        let rings = ARMS.map(|arm| {
             let on = |v: usize| parts[v] == arm.0;
             let far = distances(at.len(), &edges, f64::INFINITY, |v| !on(v));
             let mut rings: Vec<Vec<u32>> = Vec::new();
@@ -63,19 +53,21 @@ impl Arms {
                 .enumerate()
                 .filter(|(v, d)| on(*v) && d.is_finite())
             {
-                let k = (d / SKIN_RING) as usize;
+                let k = (d / settings.skin_ring) as usize;
                 rings.resize_with(rings.len().max(k + 1), Vec::new);
                 rings[k].push(v as u32);
             }
             rings.retain(|r| !r.is_empty());
             rings
-        }))
+        });
+        Self { rings, settings }
     }
     /// Centre lines of both arms of a posed body, metres.
     pub fn lines(&self, body: &[P3]) -> [CentreLine; 2] {
-        self.0.each_ref().map(|rings| {
+        self.rings.each_ref().map(|rings| {
             let centres = rings.iter();
-            CentreLine::new(centres.map(|r| centre(r.iter().map(|v| body[*v as usize]))))
+            let points = centres.map(|r| centre(r.iter().map(|v| body[*v as usize])));
+            CentreLine::new(points, self.settings)
         })
     }
 }
@@ -86,16 +78,21 @@ pub struct CentreLine {
     points: Vec<P3>,
     /// Arc length at each point, metres.
     along: Vec<f32>,
+    settings: SleeveSettings,
 }
 
 impl CentreLine {
-    fn new(points: impl Iterator<Item = P3>) -> Self {
+    fn new(points: impl Iterator<Item = P3>, settings: SleeveSettings) -> Self {
         let points: Vec<P3> = points.collect();
         let mut along = vec![0.0; points.len()];
         for k in 1..points.len() {
             along[k] = along[k - 1] + (points[k] - points[k - 1]).norm();
         }
-        Self { points, along }
+        Self {
+            points,
+            along,
+            settings,
+        }
     }
     fn length(&self) -> f32 {
         self.along.last().copied().unwrap_or(0.0)
@@ -111,13 +108,14 @@ impl CentreLine {
     }
     /// Unit direction, zero where it has none.
     fn toward(&self, s: f32) -> V3 {
-        (self.at(s + DIRECTION) - self.at(s - DIRECTION))
+        let reach = self.settings.direction;
+        (self.at(s + reach) - self.at(s - reach))
             .try_normalize(0.0)
             .unwrap_or_else(V3::zeros)
     }
     /// Arc length of the point nearest to `p` between two others, metres.
     fn nearest(&self, p: &P3, from: f32, to: f32) -> f32 {
-        let n = ((to - from) / SCAN).ceil().max(1.0) as usize;
+        let n = ((to - from) / self.settings.scan).ceil().max(1.0) as usize;
         let far = |s: &f32| (self.at(*s) - p).norm_squared();
         let all = (0..=n).map(|k| from + (to - from) * k as f32 / n as f32);
         all.min_by(|a, b| far(a).total_cmp(&far(b))).unwrap_or(from)
@@ -144,10 +142,14 @@ pub struct LostRing<'a> {
 
 impl Sleeve {
     /// The sleeves of a garment whose edges have these rest lengths, metres.
-    pub fn find(mesh: &GarmentMesh, edges: &[([u32; 2], f64)]) -> Vec<Self> {
+    pub fn find(
+        mesh: &GarmentMesh,
+        edges: &[([u32; 2], f64)],
+        settings: &SleeveSettings,
+    ) -> Vec<Self> {
         let mut lengths: Vec<f64> = edges.iter().map(|e| e.1).collect();
         let edge = percentile(&mut lengths, EDGE_PERCENTILE).unwrap_or(0.0) as f32;
-        let width = RING.max(RING_EDGES * edge);
+        let width = settings.ring.max(settings.ring_edges * edge);
         let border = border(mesh);
         (0..ARMS.len())
             .filter_map(|arm| Self::of_arm(mesh, edges, &border, arm, width))
@@ -199,6 +201,7 @@ impl Sleeve {
         at: impl Fn(u32) -> P3,
     ) -> Vec<LostRing<'a>> {
         let line = &lines[self.arm];
+        let settings = &line.settings;
         if line.length() <= 0.0 {
             return Vec::new();
         }
@@ -208,9 +211,9 @@ impl Sleeve {
         let mut last = 0.0;
         for (k, ring) in self.rings.iter().enumerate() {
             let most = if k == 0 {
-                ARMHOLE
+                settings.armhole
             } else {
-                last + MAX_SPACING * self.spacing
+                last + settings.max_spacing * self.spacing
             };
             let mut s = line.nearest(&centres[k], last, most.min(line.length()));
             // The first ring goes over the shoulder, which holds it.
@@ -218,7 +221,7 @@ impl Sleeve {
                 && ring.len() >= MIN_VERTICES
                 && !encloses(ring.iter().map(|v| at(*v)), &line.at(s), &line.toward(s))
             {
-                s = (last + RECOVERED_SPACING * self.spacing).min(line.length());
+                s = (last + settings.recovered_spacing * self.spacing).min(line.length());
                 let axis = centres[(k + 1).min(centres.len() - 1)] - centres[k - 1];
                 let turn =
                     UnitQuaternion::rotation_between(&axis, &line.toward(s)).unwrap_or_default();
@@ -274,6 +277,10 @@ mod tests {
     use super::*;
     use tryon_garment::Triangulation;
 
+    fn line_of(points: impl Iterator<Item = P3>) -> CentreLine {
+        CentreLine::new(points, SleeveSettings::default())
+    }
+
     /// Twelve rings of twelve vertices, 4 cm apart, around an arm that bends by a right angle after 24 cm.
     fn bent() -> (Sleeve, [CentreLine; 2], Vec<P3>) {
         let arm = |s: f32| {
@@ -283,7 +290,7 @@ mod tests {
                 P3::new(0.24, s - 0.24, 0.0)
             }
         };
-        let line = || CentreLine::new((0..30).map(|k| arm(0.02 * k as f32)));
+        let line = || line_of((0..30).map(|k| arm(0.02 * k as f32)));
         let mut at = Vec::new();
         let rings = (0..12).map(|k| {
             let s = 0.02 + 0.04 * k as f32;
@@ -345,7 +352,7 @@ mod tests {
             tryon_garment::library::pattern("longsleeve", tryon_garment::Size::M).expect("a shirt");
         let mesh = GarmentMesh::sew(&pattern, &Triangulation::default()).expect("sewn");
         let sheet = crate::live::Sheet::of_garment(&mesh).expect("a sheet");
-        let sleeves = Sleeve::find(&mesh, &sheet.edges);
+        let sleeves = Sleeve::find(&mesh, &sheet.edges, &SleeveSettings::default());
         assert_eq!(sleeves.iter().map(|s| s.arm).collect::<Vec<_>>(), [0, 1]);
         for s in &sleeves {
             let on: usize = mesh
@@ -367,8 +374,8 @@ mod tests {
     #[test]
     fn without_an_arm_or_cloth_no_ring_is_lost() {
         let (sleeve, lines, at) = bent();
-        let none = || CentreLine::new(std::iter::empty());
-        let point = || CentreLine::new(std::iter::repeat_n(P3::origin(), 5));
+        let none = || line_of(std::iter::empty());
+        let point = || line_of(std::iter::repeat_n(P3::origin(), 5));
         assert!(
             sleeve
                 .lost_rings(&[none(), none()], |v| at[v as usize])

@@ -8,8 +8,6 @@ use tryon_geometry::math::{P3, polar_rotation_3};
 
 /// Smoothing iterations of skin weights over cloth neighbours, a hand's width: else edges between two limbs tear.
 const SMOOTHING: usize = 6;
-/// Vertices that determine a rotation; joints with fewer move with the whole body.
-const MIN_VERTICES: f64 = 12.0;
 
 /// Moments of the vertices of one joint in two poses.
 #[derive(Clone, Copy)]
@@ -45,16 +43,11 @@ impl Moments {
 }
 
 /// Rigid motion of each joint's dominant vertices between two poses, metres.
-fn joint_motions(
-    weights: &SkinWeights,
-    joints: usize,
-    from: &[P3],
-    to: &[P3],
-) -> Vec<Isometry3<f64>> {
-    let mut moments = vec![Moments::ZERO; joints];
-    for (i, (a, b)) in from.iter().zip(to).enumerate() {
+fn joint_motions(body: &Teleport<'_>) -> Vec<Isometry3<f64>> {
+    let mut moments = vec![Moments::ZERO; body.joints];
+    for (i, (a, b)) in body.from.iter().zip(body.to).enumerate() {
         let (a, b) = (a.coords.cast::<f64>(), b.coords.cast::<f64>());
-        let m = &mut moments[weights.dominant(i)];
+        let m = &mut moments[body.weights.dominant(i)];
         m.count += 1.0;
         m.from += a;
         m.to += b;
@@ -67,7 +60,7 @@ fn joint_motions(
         Isometry3::identity()
     };
     let motion = |m: &Moments| {
-        if m.count >= MIN_VERTICES {
+        if m.count >= body.joint_vertices {
             m.motion()
         } else {
             whole
@@ -78,6 +71,8 @@ fn joint_motions(
 
 /// Body in two poses, metres, and how its vertices follow the joints.
 pub(in crate::live) struct Teleport<'a> {
+    /// Vertices that determine a rotation.
+    pub(in crate::live) joint_vertices: f64,
     pub(in crate::live) weights: &'a SkinWeights,
     pub(in crate::live) joints: usize,
     pub(in crate::live) from: &'a [P3],
@@ -101,7 +96,7 @@ impl Teleport<'_> {
 
     /// Rigid motion of each joint.
     pub(super) fn motions(&self) -> Vec<Matrix3x4<f64>> {
-        joint_motions(self.weights, self.joints, self.from, self.to)
+        joint_motions(self)
             .iter()
             .map(|m| m.to_homogeneous().fixed_view::<3, 4>(0, 0).into_owned())
             .collect()
@@ -175,6 +170,7 @@ mod tests {
         let nearest: Vec<[u32; 2]> = (0..16).map(|i| [i, i]).collect();
         let edges: Vec<([u32; 2], f64)> = (1..16).map(|i| ([i - 1, i], 0.1)).collect();
         let teleport = Teleport {
+            joint_vertices: 12.0,
             weights: &weights,
             joints: 2,
             from: &skin,
@@ -185,7 +181,11 @@ mod tests {
         for (p, q) in positions.iter().zip(&cloth) {
             assert!((p - motion * q).norm() < 1e-5, "{p} {q}");
         }
-        let none = joint_motions(&weights, 2, &[], &[]);
+        let none = joint_motions(&Teleport {
+            from: &[],
+            to: &[],
+            ..teleport
+        });
         assert_eq!(none, [Isometry3::identity(); 2]);
     }
 }

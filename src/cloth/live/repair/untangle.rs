@@ -3,30 +3,21 @@
 //! Contact keeps a fold on its side, also where that is the wrong one. So each garment is queried as a whole from time to
 //! time, and intersecting cloth moves apart a little. Where that does not help for some queries, it is smoothed locally.
 
-use super::untangler::{UNTANGLE_GAP, UNTANGLE_STEP, Untangler};
+use super::untangler::Untangler;
 use crate::contact::SurfaceFrame;
-use crate::live::config::Config;
 use crate::live::outfit_model::Model;
 use crate::live::state::{GarmentState, State};
+use crate::settings::{Config, RepairSettings};
 use tryon_garment::Region;
 use tryon_geometry::math::{P3, V3d};
 
 /// Iterations of a query.
 const ITERATIONS: usize = 8;
-/// Largest displacement of a query, metres. With 5 mm armpits without clearance for two layers stretch by 18 %.
-const MAX_DISPLACEMENT: f64 = 0.003;
 /// Intersection counter from which on a vertex is smoothed, and its largest value: four more queries after it is free.
 const STUCK: u8 = 3;
 const MAX_COUNT: u8 = 6;
-/// Rings around a stuck vertex that are smoothed, and their largest displacement, metres.
+/// Rings around a stuck vertex that are smoothed.
 const SMOOTHED_RINGS: usize = 2;
-const MAX_SMOOTHING: f64 = 0.015;
-/// Height above the skin below which nothing is moved, metres: less than a fabric's thickness.
-const MIN_HEIGHT: f64 = 5e-4;
-/// Distance beyond which skin does not constrain the displacement, metres.
-const NEAR_SKIN: f64 = 0.02;
-/// Time after which a still body's garments are not queried, s: what has no clearance would never rest.
-const MAX_STILL_TIME: f64 = 1.0;
 
 /// Scratch of untangling.
 #[derive(Debug, Default)]
@@ -51,9 +42,12 @@ impl UntangleWork {
         dt: f64,
     ) -> usize {
         let Config {
-            untangle, sleep, ..
+            untangle,
+            sleep,
+            repair,
+            ..
         } = model.config;
-        if untangle <= 0.0 || sleep && state.sleep.still_time > MAX_STILL_TIME {
+        if untangle <= 0.0 || sleep && state.sleep.still_time > repair.max_still_time {
             return 0;
         }
         let every = (untangle / dt).round().max(1.0) as u64;
@@ -86,8 +80,11 @@ impl UntangleWork {
             .for_each(|a| self.fixed[a.vertex as usize] = true);
         for k in self.sheets.len()..=k {
             let at = doubled(&state.garments[k].positions);
-            self.sheets
-                .push(Untangler::new(&model.outfit.garments[k].faces, &at));
+            let (faces, settings) = (
+                &model.outfit.garments[k].faces,
+                model.config.repair.untangler,
+            );
+            self.sheets.push(Untangler::new(faces, &at, settings));
         }
         self.x.clear();
         self.x.extend(doubled(&g.positions));
@@ -110,13 +107,7 @@ impl UntangleWork {
         g.intersection_count.resize(self.x.len(), 0);
         let mut found = 0;
         for r in 0..ITERATIONS {
-            let report = sheet.iterate(
-                model.config.par,
-                &mut self.x,
-                weight,
-                UNTANGLE_STEP,
-                UNTANGLE_GAP,
-            );
+            let report = sheet.iterate(model.config.par, &mut self.x, weight);
             if r == 0 {
                 found = report.intersections;
                 for (n, is_found) in g.intersection_count.iter_mut().zip(sheet.intersecting()) {
@@ -132,9 +123,10 @@ impl UntangleWork {
             }
         }
         g.intersecting.clear();
+        let limits = &model.config.repair;
         for (v, (from, to)) in moved(&self.from, &self.x) {
-            let displacement = (to - from).cap_magnitude(MAX_DISPLACEMENT);
-            g.displace(v, from, displacement, body);
+            let displacement = (to - from).cap_magnitude(limits.max_displacement);
+            g.displace(v, from, displacement, body, limits);
             // A capped displacement leaves the vertex on the wrong side.
             if sheet.displacements[v].1 > 0.0 || displacement != to - from {
                 g.intersecting.push(v as u32);
@@ -156,8 +148,10 @@ impl UntangleWork {
         let (own, fixed) = (&model.garments[k].own, &self.fixed);
         let movable = |v: usize| !fixed[v] && !Region(own[v]).meets(Region::ARMS);
         self.sheets[k].smooth_locally(&mut self.x, stuck, movable, SMOOTHED_RINGS);
+        let limits = &model.config.repair;
         for (v, (from, to)) in moved(&self.from, &self.x) {
-            g.displace(v, from, (to - from).cap_magnitude(MAX_SMOOTHING), body);
+            let displacement = (to - from).cap_magnitude(limits.max_smoothing);
+            g.displace(v, from, displacement, body, limits);
         }
     }
 }
@@ -174,14 +168,27 @@ fn moved<'a>(from: &'a [V3d], to: &'a [V3d]) -> impl Iterator<Item = (usize, (&'
 
 impl GarmentState {
     /// Displaces a vertex from a position, metres, but not into the skin.
-    fn displace(&mut self, v: usize, from: &V3d, displacement: V3d, body: &SurfaceFrame) {
-        let outside = outside_skin(from, displacement, self.nearest[v], body);
+    fn displace(
+        &mut self,
+        v: usize,
+        from: &V3d,
+        displacement: V3d,
+        body: &SurfaceFrame,
+        limits: &RepairSettings,
+    ) {
+        let outside = outside_skin(from, displacement, self.nearest[v], body, limits);
         self.positions[v] = P3::from((from + outside).cast::<f32>());
     }
 }
 
 /// Displacement of `x` without the part that leads into the skin at its two nearest body vertices.
-fn outside_skin(x: &V3d, mut displacement: V3d, nearest: [u32; 2], body: &SurfaceFrame) -> V3d {
+fn outside_skin(
+    x: &V3d,
+    mut displacement: V3d,
+    nearest: [u32; 2],
+    body: &SurfaceFrame,
+    limits: &RepairSettings,
+) -> V3d {
     for v in nearest {
         let (Some(at), Some(normal)) =
             (body.vertices.get(v as usize), body.normals.get(v as usize))
@@ -192,9 +199,9 @@ fn outside_skin(x: &V3d, mut displacement: V3d, nearest: [u32; 2], body: &Surfac
             normal.cast::<f64>(),
             (x - at.coords.cast::<f64>()).dot(&normal.cast()),
         );
-        let lowest = MIN_HEIGHT.min(height);
+        let lowest = limits.min_height.min(height);
         let below = lowest - (height + displacement.dot(&normal));
-        if height < NEAR_SKIN && below > 0.0 {
+        if height < limits.near_skin && below > 0.0 {
             displacement += normal * below;
         }
     }
@@ -212,11 +219,15 @@ mod tests {
             vertices: vec![P3::origin()],
             normals: vec![V3::y()],
         };
+        let limits = &RepairSettings::default();
         let down = V3d::new(0.002, -0.01, 0.0);
         let near = V3d::new(0.0, 0.003, 0.0);
-        let left = near + outside_skin(&near, down, [0, 7], &body);
-        assert!((left - V3d::new(0.002, MIN_HEIGHT, 0.0)).norm() < 1e-12);
-        assert_eq!(outside_skin(&(near * 10.0), down, [0, 7], &body), down);
-        assert_eq!(outside_skin(&near, down, [7, 8], &body), down);
+        let left = near + outside_skin(&near, down, [0, 7], &body, limits);
+        assert!((left - V3d::new(0.002, limits.min_height, 0.0)).norm() < 1e-12);
+        assert_eq!(
+            outside_skin(&(near * 10.0), down, [0, 7], &body, limits),
+            down
+        );
+        assert_eq!(outside_skin(&near, down, [7, 8], &body, limits), down);
     }
 }

@@ -4,25 +4,11 @@
 //! off, the intersection contour is shortened until it vanishes (Volino & Magnenat-Thalmann 2006, "Resolving surface
 //! collisions through intersection contour minimization").
 
+pub use crate::settings::UntanglerSettings;
 use tryon_geometry::math::V3d;
 use tryon_geometry::mesh::Face;
 use tryon_geometry::par::Par;
 use tryon_geometry::spatial::SelfIntersections;
-
-/// Largest motion of an edge against a triangle in one iteration (m). A third of it leaves intersections from one pose to
-/// the next.
-pub const UNTANGLE_STEP: f64 = 0.003;
-/// Distance at which vertices from the wrong side are placed (m).
-pub const UNTANGLE_GAP: f64 = 0.001;
-
-/// Least sine of the angle between an edge and a triangle: flatter ones would displace the contour without bound.
-const MIN_SINE: f64 = 0.05;
-/// Turn of the contour (length of a sum of unit vectors) below which the displacement is less than a whole step.
-const STRAIGHT: f64 = 1.0;
-/// Weight of the edge's steepness against the contour's direction (Volino & Magnenat-Thalmann, eq. 5).
-const STEEPNESS: f64 = 2.0;
-/// Share of its sheet's vertices below which a part that is cut off is on the wrong side.
-const CUT_OFF: f64 = 0.3;
 
 /// Rings of wrong-side vertices that follow the intersecting edges in an iteration.
 const FOLLOWING: usize = 4;
@@ -56,6 +42,7 @@ pub struct Untangler {
     whole: Vec<u32>,
     /// Surroundings of the intersections that the last query of the whole sheet found.
     active: Option<ActivePatch>,
+    settings: UntanglerSettings,
 }
 
 /// Part of the sheet, and the indices of its edges and triangles there.
@@ -97,7 +84,7 @@ struct EdgeCut {
 
 impl Untangler {
     /// Prepares a sheet at `x`, metres.
-    pub fn new(faces: &[Face], x: &[V3d]) -> Self {
+    pub fn new(faces: &[Face], x: &[V3d], settings: UntanglerSettings) -> Self {
         let mut new = Self {
             finder: SelfIntersections::new(faces, x),
             displacements: Vec::new(),
@@ -107,20 +94,25 @@ impl Untangler {
             wrong_side: Vec::new(),
             whole: Vec::new(),
             active: None,
+            settings,
         };
         new.whole = new.part_sizes(x.len(), false);
         new
     }
-    /// Moves every intersecting edge against its triangle by up to `step` metres, and wrong-side ends `gap` metres beyond.
-    /// `weights` are inverse masses, 0 for fixed vertices.
+    /// Moves every intersecting edge against its triangle by a step at most, and wrong-side ends a gap beyond. `weights` are
+    /// inverse masses, 0 for fixed vertices.
     pub fn iterate(
         &mut self,
         par: Par,
         x: &mut [V3d],
         weights: impl Fn(usize) -> f64,
-        step: f64,
-        gap: f64,
     ) -> UntangleReport {
+        let UntanglerSettings {
+            step,
+            gap,
+            straight,
+            ..
+        } = self.settings;
         let found = self.find(par, x);
         self.displacements.clear();
         self.displacements.resize(x.len(), (V3d::zeros(), 0.0));
@@ -141,7 +133,7 @@ impl Untangler {
                 continue;
             } else {
                 let turn = cut.displacement.norm_squared();
-                cut.displacement *= step / (turn + STRAIGHT * STRAIGHT).sqrt();
+                cut.displacement *= step / (turn + straight * straight).sqrt();
             }
             self.add(&cut, &weights);
         }
@@ -268,7 +260,7 @@ impl Untangler {
             parts
                 .iter()
                 .zip(&self.whole)
-                .map(|(p, w)| f64::from(*p) < CUT_OFF * f64::from(*w)),
+                .map(|(p, w)| f64::from(*p) < self.settings.cut_off * f64::from(*w)),
         );
         self.wrong_side.iter().filter(|w| **w).count()
     }
@@ -298,7 +290,7 @@ impl Untangler {
         let at = p + (q - p) * t;
         let share = |u: &V3d, v: &V3d| (u - at).cross(&(v - at)).dot(&full) / full.norm_squared();
         let steep = along.dot(&normal);
-        let steep = steep.signum() * steep.abs().max(MIN_SINE);
+        let steep = steep.signum() * steep.abs().max(self.settings.min_sine);
         let mut displacement = V3d::zeros();
         for n in self.finder.faces_beside(e) {
             let face = self.finder.faces()[n as usize].map(|v| v as usize);
@@ -315,7 +307,7 @@ impl Untangler {
             } else {
                 line
             };
-            displacement += line - normal * (STEEPNESS * along.dot(&line) / steep);
+            displacement += line - normal * (self.settings.steepness * along.dot(&line) / steep);
         }
         let weights = [1.0 - t, t, -share(&b, &c), -share(&c, &a), -share(&a, &b)];
         let is_finite = weights.iter().chain(&displacement).all(|c| c.is_finite());
@@ -380,13 +372,17 @@ mod tests {
         ([a.0, b.0].concat(), [a.1, b.1].concat())
     }
 
-    /// Intersections by iteration until there are none, at most `most`, and the result.
-    fn untangle(
-        (mut x, faces): (Vec<V3d>, Vec<Face>),
-        step: f64,
-        most: usize,
-    ) -> (Vec<usize>, Vec<V3d>) {
-        let mut u = Untangler::new(&faces, &x);
+    fn settings(step: f64, gap: f64) -> UntanglerSettings {
+        UntanglerSettings {
+            step,
+            gap,
+            ..UntanglerSettings::default()
+        }
+    }
+
+    /// Intersections by iteration until there are none, at most `most`.
+    fn untangle(mut x: Vec<V3d>, faces: &[Face], most: usize) -> Vec<usize> {
+        let mut u = Untangler::new(faces, &x, settings(0.002, 0.001));
         let mut counts = Vec::new();
         let rest: Vec<f64> = u
             .finder
@@ -395,7 +391,7 @@ mod tests {
             .map(|e| (x[e[0] as usize] - x[e[1] as usize]).norm())
             .collect();
         for _ in 0..most {
-            let r = u.iterate(Par::Seq, &mut x, |_| 1.0, step, 0.001);
+            let r = u.iterate(Par::Seq, &mut x, |_| 1.0);
             for _ in 0..4 {
                 for (e, l) in u.finder.edges().iter().zip(&rest) {
                     let [a, b] = e.map(|v| v as usize);
@@ -410,7 +406,7 @@ mod tests {
                 break;
             }
         }
-        (counts, x)
+        counts
     }
 
     const CELL: f64 = 0.02;
@@ -424,7 +420,8 @@ mod tests {
             let (a, b) = (u * CELL * 0.5f64.sqrt(), v * CELL * 0.5f64.sqrt());
             [a - b, a + b - 0.012, 0.003]
         });
-        let (counts, _) = untangle(two(flat, corner), 0.002, 60);
+        let (x, faces) = two(flat, corner);
+        let counts = untangle(x, &faces, 60);
         assert_eq!(counts.last(), Some(&0));
     }
 
@@ -452,7 +449,7 @@ mod tests {
                 }
             });
             x.truncate(last);
-            let (counts, _) = untangle((x, faces), 0.002, 200);
+            let counts = untangle(x, &faces, 200);
             assert_eq!(counts.last(), Some(&0), "{sag}");
         }
     }
@@ -469,7 +466,7 @@ mod tests {
             };
             [along, if u > 12.0 { 0.004 - bump } else { 0.0 }, v * CELL]
         });
-        let (counts, _) = untangle(strip, 0.002, 60);
+        let counts = untangle(strip.0, &strip.1, 60);
         assert!(counts[0] > 4, "{counts:?}");
         assert_eq!(counts.last(), Some(&0), "{counts:?}");
     }
@@ -485,12 +482,8 @@ mod tests {
         });
         let (mut x, faces) = two(flat, spiked);
         let tip = n + 8 * 17 + 8;
-        let mut u = Untangler::new(&faces, &x);
-        assert!(
-            u.iterate(Par::Seq, &mut x, |_| 1.0, 0.001, 0.0)
-                .intersections
-                > 0
-        );
+        let mut u = Untangler::new(&faces, &x, settings(0.001, 0.0));
+        assert!(u.iterate(Par::Seq, &mut x, |_| 1.0).intersections > 0);
         let before = x.clone();
         u.smooth_locally(&mut x, u.intersecting().collect(), |v| v != tip, 2);
         assert_eq!(x[tip], before[tip], "it may not move");
@@ -504,11 +497,7 @@ mod tests {
         // Three cells from the spike, of which one is an edge that crossed.
         let near = |v: usize| [0, 2].iter().all(|k| before[v][*k].abs() < 3.5 * CELL);
         assert!((0..x.len()).all(|v| near(v) || x[v] == before[v]));
-        assert!(
-            u.iterate(Par::Seq, &mut x, |_| 1.0, 0.001, 0.0)
-                .intersections
-                == 0
-        );
+        assert_eq!(u.iterate(Par::Seq, &mut x, |_| 1.0).intersections, 0);
     }
 
     #[test]
@@ -531,11 +520,11 @@ mod tests {
         .map(V3d::from)
         .to_vec();
         let before = x.clone();
-        let mut u = Untangler::new(&faces, &x);
-        let held = u.iterate(Par::Seq, &mut x, |_| 0.0, 0.01, 0.001);
+        let mut u = Untangler::new(&faces, &x, settings(0.01, 0.001));
+        let held = u.iterate(Par::Seq, &mut x, |_| 0.0);
         assert!(held.intersections > 0);
         assert!(x.iter().zip(&before).all(|(a, b)| a == b || b.x.is_nan()));
-        u.iterate(Par::Seq, &mut x, |_| 1.0, 0.01, 0.001);
+        u.iterate(Par::Seq, &mut x, |_| 1.0);
         let bound = 0.1;
         assert!(
             x.iter()

@@ -8,8 +8,6 @@ use crate::live::solver::explicit::PatchModel;
 pub(in crate::live) const ISLAND: usize = 96;
 /// Vertices of a cluster of skin, which is tested as one.
 const SKIN_CLUSTER: usize = 64;
-/// Distance within which moving cloth wakes an island, metres and lengths of its edges.
-const WAKE_DISTANCE: (f32, f32) = (0.008, 0.6);
 
 /// Immutable islands of one garment.
 #[derive(Debug, Default)]
@@ -29,12 +27,12 @@ pub(in crate::live) struct IslandModel {
 }
 
 impl IslandModel {
-    /// Islands of the patches of a garment with `edges` (vertices, rest length), 95 % of which are at most `edge` long.
+    /// Islands of the patches of a garment with `edges` (vertices, rest length).
     pub(in crate::live) fn new(
         patches: &[PatchModel],
         vertices: usize,
         edges: &[([u32; 2], f64)],
-        edge: f32,
+        wake_distance: f32,
     ) -> Self {
         let (mut members, mut first) = (Vec::new(), Vec::new());
         for f in patches {
@@ -67,7 +65,7 @@ impl IslandModel {
             adjacent,
             boundary_edges,
             first,
-            wake_distance: WAKE_DISTANCE.0 + WAKE_DISTANCE.1 * edge,
+            wake_distance,
         }
     }
 }

@@ -3,31 +3,18 @@
 //! An island falls asleep when it, its neighbours and its supporting skin have been still for some steps and nothing
 //! moves nearby. It wakes when that skin, an anchor or adjacent cloth moves, or when other cloth or skin comes near.
 
-use super::criteria::still_skin;
 use super::follow_skin::skin_displacements;
 use super::state::{Island, SleepState};
 use super::wake_source::WakeSources;
 use crate::live::outfit_model::Model;
 use crate::live::patch::PatchWork;
 use crate::live::state::{GarmentState, State};
+use crate::settings::{Config, StillnessSettings};
 use tryon_geometry::math::order_statistics::percentile;
 use tryon_geometry::math::{P3, V3};
 
-/// Speed below which an island may fall asleep, on an exact and on a tracked body, m/s. At 5 mm/s a ninth as much sleeps,
-/// at 10 mm/s cloth of coarse edges never does.
-const SLEEP_SPEED: [f32; 2] = [0.02, 0.05];
 /// Percentage of an island's vertices that are at most as fast as its speed.
 const SPEED_PERCENTILE: usize = 90;
-/// Steps below the sleep speed before an island falls asleep.
-const SLOW_STEPS: u32 = 10;
-/// Factors of still skin within which a sleeping island follows a tracked body: since sleep began, and per step. With those
-/// of the whole outfit (5 and 2) sleeves slept where a waving arm turns, 2 cm off.
-const SWAY: [f32; 2] = [2.5, 1.0];
-/// Distance within which skin of other parts supports an island, and moving skin wakes it, metres.
-const SKIN_DISTANCE: f32 = 0.03;
-/// Relative elongation and rotation (rad) of a boundary edge that wake an island.
-const WAKE_ELONGATION: f32 = 0.01;
-const WAKE_ROTATION: f32 = 0.07;
 
 /// Thresholds of sleep for a body that is exact or tracked.
 struct Thresholds {
@@ -41,12 +28,17 @@ struct Thresholds {
 }
 
 impl Thresholds {
-    fn new(noise_deadband: f64) -> Self {
-        let is_tracked = noise_deadband > 0.0;
-        let calm = still_skin(noise_deadband)[0];
-        let [sway, per_step] = if is_tracked { SWAY } else { [1.0; 2] };
+    fn new(config: &Config) -> Self {
+        let settings = &config.stillness;
+        let is_tracked = config.noise_deadband > 0.0;
+        let calm = settings.still_skin(config.noise_deadband)[0];
+        let [sway, per_step] = if is_tracked {
+            settings.island_sway
+        } else {
+            [1.0; 2]
+        };
         Self {
-            speed: SLEEP_SPEED[usize::from(is_tracked)],
+            speed: settings.island_speed[usize::from(is_tracked)],
             calm,
             sway: sway * calm,
             per_step: per_step * calm,
@@ -78,7 +70,7 @@ pub(in crate::live) fn wake_islands(model: &Model, state: &mut State, body: &Bod
         return sleep.reset_islands();
     }
     sleep.fit(&model.garments, to);
-    let thresholds = Thresholds::new(c.noise_deadband);
+    let thresholds = Thresholds::new(c);
     let mut sources = follow_body(sleep, model, [body.from, to], &thresholds);
     if body.teleported {
         sleep.wake_all();
@@ -92,7 +84,7 @@ pub(in crate::live) fn wake_islands(model: &Model, state: &mut State, body: &Bod
         for (r, island) in islands.iter().enumerate().filter(|i| i.1.asleep) {
             let boundary = &model.garments[g].islands.boundary_edges[r];
             if !(is_supported(island, [body.from, to], &thresholds)
-                && is_boundary_still(island, boundary, &garments[g].positions))
+                && is_boundary_still(&c.stillness, island, boundary, &garments[g].positions))
                 || sources.reach(model, garments, g, r)
             {
                 woken.push((g, r));
@@ -135,7 +127,8 @@ fn follow_body(
         }
         if !points.is_empty() {
             // It may have passed an island within this step.
-            sources.push(points, SKIN_DISTANCE + thresholds.sway + farthest, None);
+            let distance = model.config.stillness.skin_distance;
+            sources.push(points, distance + thresholds.sway + farthest, None);
         }
     }
     sources
@@ -151,12 +144,17 @@ fn is_supported(island: &Island, [from, to]: [&[P3]; 2], thresholds: &Thresholds
 }
 
 /// Its boundary edges are as they were when it fell asleep.
-fn is_boundary_still(island: &Island, edges: &[[u32; 2]], positions: &[P3]) -> bool {
+fn is_boundary_still(
+    settings: &StillnessSettings,
+    island: &Island,
+    edges: &[[u32; 2]],
+    positions: &[P3],
+) -> bool {
     edges.iter().zip(&island.boundary).all(|([a, b], was)| {
         let is = positions[*b as usize] - positions[*a as usize];
         let length = was.norm();
-        (is.norm() - length).abs() <= WAKE_ELONGATION * length
-            && (is - was).norm() <= WAKE_ROTATION * length
+        (is.norm() - length).abs() <= settings.wake_elongation * length
+            && (is - was).norm() <= settings.wake_rotation * length
     })
 }
 
@@ -205,7 +203,7 @@ pub(in crate::live) fn put_islands_to_sleep(
     if !(c.sleep && c.sleep_regions) {
         return;
     }
-    let thresholds = Thresholds::new(c.noise_deadband);
+    let thresholds = Thresholds::new(c);
     let State {
         garments,
         sleep,
@@ -213,7 +211,8 @@ pub(in crate::live) fn put_islands_to_sleep(
         ..
     } = state;
     measure_speeds(model, sleep, patches, &thresholds, dt);
-    let is_slow = |island: &Island| !island.asleep && island.slow_steps >= SLOW_STEPS;
+    let slow_steps = c.stillness.slow_steps;
+    let is_slow = |island: &Island| !island.asleep && island.slow_steps >= slow_steps;
     if !sleep.islands.iter().flatten().any(is_slow) {
         return;
     }
@@ -228,7 +227,7 @@ pub(in crate::live) fn put_islands_to_sleep(
                 continue;
             }
             let skin = supporting_skin(model, g, r, &garments[g], body.vertices());
-            let is_calm = |v: &u32| sleep.calm[*v as usize].1 >= SLOW_STEPS;
+            let is_calm = |v: &u32| sleep.calm[*v as usize].1 >= slow_steps;
             if skin.iter().all(is_calm) && !sources.reach(model, garments, g, r) {
                 let slow_steps = island.slow_steps;
                 tired.push((g, r, skin, slow_steps));
@@ -292,11 +291,12 @@ fn supporting_skin(
     body: &[P3],
 ) -> Vec<u32> {
     let islands = &model.garments[garment].islands;
+    let near = model.config.stillness.skin_distance;
     let mut skin = Vec::new();
     for v in &islands.members[island] {
         let (x, [own, other]) = (s.positions[*v as usize], s.nearest[*v as usize]);
         skin.push(own);
-        if (body[other as usize] - x).norm_squared() < SKIN_DISTANCE * SKIN_DISTANCE {
+        if (body[other as usize] - x).norm_squared() < near * near {
             skin.push(other);
         }
     }
@@ -355,7 +355,7 @@ mod tests {
     #[test]
     fn still_islands_sleep_together_after_their_slow_steps() {
         let (model, state, _, steps) = asleep();
-        assert_eq!(steps, SLOW_STEPS);
+        assert_eq!(steps, model.config.stillness.slow_steps);
         assert!(state.sleep.islands[0].len() > 4);
         assert!(state.sleep.islands[0].iter().all(|i| i.asleep));
         let vertices = state.garments[0].positions.len();

@@ -8,7 +8,7 @@ mod outfit;
 mod state;
 pub(crate) mod wake_source;
 
-pub(super) use criteria::{is_body_still, speed_limit};
+pub(super) use criteria::is_body_still;
 pub(super) use islands::{BodyStep, follow_sleeping, put_islands_to_sleep, wake_islands};
 pub(super) use outfit::{follow_asleep, update_stillness};
 pub(super) use state::SleepState;

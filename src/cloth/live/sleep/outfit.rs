@@ -1,15 +1,12 @@
 //! Sleep of the whole outfit, which then follows the skin without being simulated.
 
-use super::criteria::{stays_asleep, still_cloth_speed};
+use super::criteria::stays_asleep;
 use super::follow_skin::follow_skin;
 use crate::contact::CollisionWorkspace;
 use crate::live::outfit_model::Model;
 use crate::live::report::StepReport;
 use crate::live::state::State;
 use tryon_geometry::par;
-
-/// Steps with body and cloth still after which the outfit falls asleep.
-const STILL_STEPS: u32 = 10;
 
 /// Lets a sleeping outfit follow the filtered body of `work`; `None` when it is awake or wakes.
 ///
@@ -20,7 +17,10 @@ pub(in crate::live) fn follow_asleep(
     work: &mut CollisionWorkspace,
 ) -> Option<StepReport> {
     let config = &model.config;
-    if !config.sleep || state.sleep.still_steps < STILL_STEPS || state.body.is_new() {
+    if !config.sleep
+        || state.sleep.still_steps < config.stillness.still_steps
+        || state.body.is_new()
+    {
         return None;
     }
     if let Some(to) = state.body.shifted(&model.collision, work) {
@@ -31,7 +31,7 @@ pub(in crate::live) fn follow_asleep(
             ..
         } = state;
         let from = body.vertices();
-        if !stays_asleep(config.noise_deadband, sleep, garments, from, &to) {
+        if !stays_asleep(config, sleep, garments, from, &to) {
             return None;
         }
         par::for_chunks(config.par, garments, 1, |k, g| {
@@ -53,7 +53,9 @@ pub(in crate::live) fn update_stillness(model: &Model, state: &mut State, still:
     if !still {
         sleep.reference.copy_from_slice(state.body.vertices());
     }
-    let is_slow = speed < still_cloth_speed(model.config.noise_deadband);
+    let config = &model.config;
+    let is_tracked = config.noise_deadband > 0.0;
+    let is_slow = speed < config.stillness.still_cloth[usize::from(is_tracked)];
     sleep.still_steps = if still && is_slow {
         sleep.still_steps + 1
     } else {

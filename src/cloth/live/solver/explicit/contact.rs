@@ -5,11 +5,14 @@ use super::patch_model::PatchModel;
 use super::patch_state::{PatchState, Substep};
 use super::vec4::{MAX_VERTICES, V4};
 
-/// Speed that a vertex may gain towards a surface between two searches for reachable planes (m/s): over 1.7 ms 120 times
-/// gravity. Smaller misses contacts; larger keeps planes out of reach.
-const SPEED_GAIN: f32 = 2.0;
-/// Share of a penetration that one substep removes. Larger jitters; smaller leaves cloth inside for longer.
-const RECOVERED: f32 = 0.2;
+/// Recovery from a penetration.
+#[derive(Clone, Copy, Debug)]
+pub struct Recovery {
+    /// Share of the penetration that one substep removes.
+    pub share: f32,
+    /// Its largest speed (m/s).
+    pub speed: f32,
+}
 
 /// Velocity of one vertex against a plane, split into normal and tangential parts.
 struct Approach {
@@ -81,31 +84,31 @@ impl PatchState {
             }
         }
     }
-    /// Appends the planes that their vertices may reach within `span` seconds from time `t`.
+    /// Appends the planes that their vertices may reach within `span` seconds from time `t`, gaining `gain` m/s at most.
     pub fn find_reachable(
         &self,
         planes: &[ContactPlane],
-        t: f32,
-        span: f32,
+        [t, span]: [f32; 2],
+        gain: f32,
         out: &mut Vec<ContactPlane>,
     ) {
         let near = |p: &&ContactPlane| {
             let i = p.vertex as usize;
             let toward = p.normal.dot(self.velocity[i]) - p.rate();
-            p.gap(self.position(i), t) < span * (SPEED_GAIN - toward.min(0.0))
+            p.gap(self.position(i), t) < span * (gain - toward.min(0.0))
         };
         out.extend(planes.iter().filter(near));
     }
     /// Removes velocities into the planes by the end of a substep of `h` that begins at time `t`, with Coulomb friction
-    /// against the surface. Penetrations recover at `recovery` m/s at most. Planes of one substep that oppose each other
-    /// move a vertex along none of them. Returns the number of contacts.
+    /// against the surface. Planes of one substep that oppose each other move a vertex out along none of them. Returns the number of contacts.
     pub fn resolve_contacts(
         &mut self,
         planes: &[ContactPlane],
         t: f32,
         h: f32,
-        recovery: f32,
+        recovery: Recovery,
     ) -> usize {
+        let (share, most) = (recovery.share, recovery.speed * h);
         let mut touched = 0;
         for p in planes {
             let i = p.vertex as usize;
@@ -124,7 +127,7 @@ impl PatchState {
                 touched += 1;
             }
             if a.gap < 0.0 {
-                self.recover(p, (-a.gap * RECOVERED).min(recovery * h));
+                self.recover(p, (-a.gap * share).min(most));
             }
         }
         touched
@@ -156,6 +159,7 @@ impl PatchState {
 
 #[cfg(test)]
 mod tests {
+    use super::super::test_sheets::RECOVERY;
     use super::*;
 
     /// Displacement in one substep of a vertex at the origin, 1 cm under planes with these normals (m).
@@ -168,7 +172,7 @@ mod tests {
                 offset: 0.01,
                 ..ContactPlane::default()
             };
-            state.resolve_contacts(&[plane], 0.0, 1e-3, 1.0);
+            state.resolve_contacts(&[plane], 0.0, 1e-3, RECOVERY);
         }
         state.displacement[0]
     }

@@ -7,6 +7,7 @@ use super::elements::Diagonal;
 use super::patch_model::PatchModel;
 use super::patch_state::{Exemptions, PatchState};
 use super::vec4::V4;
+use crate::settings::FoldSettings;
 
 /// Minimal distance of two vertices that may be violated soon.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -27,18 +28,12 @@ pub struct FoldActivation<'a> {
     pub span: f32,
     /// Vertices without limits.
     pub except: Exemptions<'a>,
+    /// Settings.
+    pub settings: &'a FoldSettings,
 }
 
-/// Closing speed that two vertices may gain until the next search for active limits (m/s). Smaller misses some.
-const SPEED_GAIN: f32 = 0.3;
-/// Share of a violation that one substep removes. Larger jitters.
-const RECOVERED: f32 = 0.2;
-/// Largest opening speed of a violated limit (m/s).
-const RECOVERY_SPEED: f32 = 1.0;
 /// Shortest distance that has a direction (m).
 const SHORTEST: f32 = 1e-6;
-/// Largest minimal distance (m): folds of 3 cm triangles would not fit under an arm with more.
-const WIDEST: f32 = 0.02;
 
 impl FoldLimit {
     /// Limits that may become active until the next search: pairs that may come nearer than `ratio` times their flat
@@ -66,6 +61,7 @@ impl FoldLimit {
             ratio,
             span,
             except,
+            settings,
         } = *activation;
         let Diagonal { ends, flat } = *diagonal;
         let [a, b] = ends.map(|v| v as usize);
@@ -75,7 +71,10 @@ impl FoldLimit {
         if square >= flat * flat || except.unlimited[a] || except.unlimited[b] {
             return None;
         }
-        let (length, least) = (square.sqrt().max(SHORTEST), (ratio * flat).min(WIDEST));
+        let (length, least) = (
+            square.sqrt().max(SHORTEST),
+            (ratio * flat).min(settings.widest),
+        );
         let opening = d.dot(state.velocity[b] - state.velocity[a]) / length;
         let weight = [a, b].map(|v| {
             if except.fixed[v] {
@@ -85,7 +84,7 @@ impl FoldLimit {
             }
         });
         let both = weight[0] + weight[1];
-        let active = both > 0.0 && length - least < span * (SPEED_GAIN - opening);
+        let active = both > 0.0 && length - least < span * (settings.speed_gain - opening);
         active.then(|| Self {
             ends,
             least,
@@ -94,7 +93,8 @@ impl FoldLimit {
     }
     /// Removes closing velocities that would violate the limits by the end of a substep of `h`, and recovers violated
     /// ones. Impulses are equal and opposite: linear and angular momentum stay.
-    pub fn apply(limits: &[Self], state: &mut PatchState, h: f32) {
+    pub fn apply(limits: &[Self], state: &mut PatchState, h: f32, settings: &FoldSettings) {
+        let (share, most) = (settings.recovered, settings.recovery_speed * h);
         for s in limits {
             let [a, b] = s.ends.map(|v| v as usize);
             let d = state.position(b) - state.position(a);
@@ -110,7 +110,7 @@ impl FoldLimit {
                 state.velocity[b] = state.velocity[b] + normal.scale(push * s.share[1]);
             }
             if gap < 0.0 {
-                let opening = (-gap * RECOVERED).min(RECOVERY_SPEED * h);
+                let opening = (-gap * share).min(most);
                 state.displacement[a] = state.displacement[a] - normal.scale(opening * s.share[0]);
                 state.displacement[b] = state.displacement[b] + normal.scale(opening * s.share[1]);
             }
@@ -123,6 +123,7 @@ mod tests {
     use super::super::test_sheets::{cotton, grid, sheet};
     use super::super::{StableSheet, StepSpec, Substep};
     use super::*;
+    use crate::settings::SolverSettings;
     use tryon_geometry::math::V3d;
 
     const H: f32 = 2e-4;
@@ -149,7 +150,7 @@ mod tests {
                 bending_interval: 3,
                 filter_degree: 0,
             };
-            let model = StableSheet::new(&s, &spec)
+            let model = StableSheet::new(&s, &spec, &SolverSettings::default())
                 .compile_patches(1, 0, 0)
                 .remove(0);
             let flat: Vec<V3d> = model.vertices.iter().map(|v| x[*v as usize]).collect();
@@ -204,7 +205,7 @@ mod tests {
             }
             self.state
                 .integrate_velocities(&self.model, &step, &[], &[]);
-            FoldLimit::apply(limits, &mut self.state, H);
+            FoldLimit::apply(limits, &mut self.state, H, &FoldSettings::default());
             if let Some(i) = held {
                 self.state.velocity[i] = V4::default();
             }
@@ -222,6 +223,7 @@ mod tests {
                     fixed: &fixed,
                     unlimited: &vec![false; n],
                 },
+                settings: &FoldSettings::default(),
             };
             let (mut limits, mut sharpest) = (Vec::new(), f64::INFINITY);
             for k in 0..STEPS {
@@ -272,7 +274,7 @@ mod tests {
             least: 0.01,
             share: [0.5; 2],
         };
-        FoldLimit::apply(&[limit], &mut state, 1e-3);
+        FoldLimit::apply(&[limit], &mut state, 1e-3, &FoldSettings::default());
         let zero = |v: &V4| *v == V4::default();
         assert!(state.velocity.iter().chain(&state.displacement).all(zero));
     }

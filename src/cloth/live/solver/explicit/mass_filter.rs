@@ -7,6 +7,7 @@
 
 use super::edge_stiffness::TriangleSprings;
 use crate::live::Sheet;
+use crate::settings::SolverSettings;
 use nalgebra::Vector2;
 
 /// MassFilter W, as weights of edges.
@@ -21,25 +22,18 @@ pub(super) struct MassFilter {
     pub(super) coefficients: Vec<f64>,
 }
 
-/// Start of the Chebyshev argument beyond 1, times the degree squared: every wave keeps a twentieth of its acceleration.
-/// Smaller leaves some waves nearly without forces; larger shortens the step.
-const DAMPING: f64 = 1.0;
-/// Safety factor of the largest eigenvalue, whose estimate is a lower bound. Larger filters less.
-const EIGENVALUE_MARGIN: f64 = 1.03;
-/// Quantile of the vertices' stiffness over mass that normalises the weights. Larger lets slivers weaken the filter.
-const USUAL_QUANTILE: f64 = 0.9;
 /// Iterations of the power method. Fewer underestimate the eigenvalue by more than its margin.
 const POWER_ITERATIONS: usize = 60;
 
 /// Coefficients of w(s) = (1 − Tₙ(u) / Tₙ(u₀)) / (c s) with n = degree + 1, u falling from u₀ at s = 0 to −1 at s = 1:
 /// the polynomial with w(0) = 1 and (nearly) the smallest s·w(s) on 0 to 1, about 1/n² (van der Houwen's damped stability
 /// polynomials).
-pub(super) fn coefficients(degree: usize) -> Vec<f64> {
+pub(super) fn coefficients(degree: usize, damping: f64) -> Vec<f64> {
     if degree == 0 {
         return vec![1.0];
     }
     let n = degree + 1;
-    let u0 = 1.0 + DAMPING / (n * n) as f64;
+    let u0 = 1.0 + damping / (n * n) as f64;
     // Tₖ(u₀ − (1 + u₀) s) as polynomials in s, by Tₖ₊₁ = 2u Tₖ − Tₖ₋₁.
     let (mut before, mut now) = (vec![1.0], vec![u0, -(1.0 + u0)]);
     for _ in 1..n {
@@ -58,7 +52,12 @@ pub(super) fn coefficients(degree: usize) -> Vec<f64> {
 
 impl MassFilter {
     /// Filter of a sheet, with the edges' own stiffness as weights. `ends` of its edges, the lower vertex first.
-    pub(super) fn of_sheet(sheet: &Sheet, ends: Vec<[u32; 2]>, degree: usize) -> Self {
+    pub(super) fn of_sheet(
+        sheet: &Sheet,
+        ends: Vec<[u32; 2]>,
+        degree: usize,
+        settings: &SolverSettings,
+    ) -> Self {
         let mut order: Vec<([u32; 2], usize)> =
             ends.iter().enumerate().map(|(i, e)| (*e, i)).collect();
         order.sort_unstable();
@@ -76,11 +75,17 @@ impl MassFilter {
             }
         }
         let inverse_mass = sheet.mass.iter().map(|m| 1.0 / m).collect();
-        Self::new(ends, &own, inverse_mass, degree)
+        Self::new(ends, &own, inverse_mass, degree, settings)
     }
     /// Filter with weights in proportion to the `stiffness` of each edge (N/m). Regions stiffer for their mass than most
     /// are normalised by themselves, so that one sliver does not weaken the filter elsewhere.
-    fn new(ends: Vec<[u32; 2]>, stiffness: &[f64], inverse_mass: Vec<f64>, degree: usize) -> Self {
+    fn new(
+        ends: Vec<[u32; 2]>,
+        stiffness: &[f64],
+        inverse_mass: Vec<f64>,
+        degree: usize,
+        settings: &SolverSettings,
+    ) -> Self {
         let mut around = vec![0.0; inverse_mass.len()];
         for (e, k) in ends.iter().zip(stiffness) {
             e.iter().for_each(|v| around[*v as usize] += k);
@@ -89,7 +94,7 @@ impl MassFilter {
         let mut all: Vec<f64> = (0..around.len() as u32).map(rate).collect();
         all.sort_unstable_by(f64::total_cmp);
         let usual = all
-            .get((all.len() as f64 * USUAL_QUANTILE) as usize)
+            .get((all.len() as f64 * settings.usual_quantile) as usize)
             .copied()
             .unwrap_or(0.0)
             .max(f64::MIN_POSITIVE);
@@ -99,11 +104,11 @@ impl MassFilter {
             ends,
             weight,
             inverse_mass,
-            coefficients: coefficients(degree),
+            coefficients: coefficients(degree, settings.filter_damping),
         };
         if degree > 0 {
-            let scale =
-                1.0 / (EIGENVALUE_MARGIN * filter.largest_eigenvalue()).max(f64::MIN_POSITIVE);
+            let largest = settings.eigenvalue_margin * filter.largest_eigenvalue();
+            let scale = 1.0 / largest.max(f64::MIN_POSITIVE);
             filter.weight.iter_mut().for_each(|w| *w *= scale);
         }
         filter
@@ -179,7 +184,7 @@ mod tests {
     #[test]
     fn polynomial_starts_at_one_stays_positive_and_bounds_s_times_w() {
         for degree in 0..4 {
-            let w = coefficients(degree);
+            let w = coefficients(degree, SolverSettings::default().filter_damping);
             assert_eq!(w.len(), degree + 1);
             assert!((w[0] - 1.0).abs() < 1e-12);
             let at = |s: f64| w.iter().rev().fold(0.0, |a, c| a * s + c);

@@ -33,6 +33,7 @@ mod tests;
 mod vec4;
 
 pub use constraint::{ContactPlane, Pin};
+pub use contact::Recovery;
 pub use fold_limit::{FoldActivation, FoldLimit};
 pub use patch_model::PatchModel;
 pub use patch_state::{Exemptions, PatchState, Substep};

@@ -3,20 +3,13 @@
 use super::edge_stiffness::TriangleSprings;
 use super::mass_filter::{MassFilter, noise};
 use crate::live::{Element, Hinge, Sheet};
+use crate::settings::SolverSettings;
 use nalgebra::{Matrix6, Rotation2, Vector2, Vector3, Vector6};
 
 /// Iterations of [`soften`]: enough for an eigenvalue within a few percent of the limit.
 const SOFTEN_ITERATIONS: usize = 8;
-/// Share of the limit that ends [`soften`]. Nearer takes more iterations; farther softens more than needed.
-const NEAR_LIMIT: f64 = 0.96;
-/// Under-relaxation of the bound's correction. Nearer to 1 overshoots the limit in the last iteration.
-const RELAXATION: f64 = 0.985;
-/// Range of the bound's correction in one iteration (ratio): a wider one oscillates on sheets with slivers.
-const CORRECTION: [f64; 2] = [0.3, 1.5];
 /// Iterations of the power method. A Rayleigh quotient converges twice as fast as its vector: a few percent are left.
 const POWER_ITERATIONS: usize = 40;
-/// Share of elements that may be too stiff for a step which counts as stable for the sheet. More soften visible cloth.
-const OUTLIERS: f64 = 0.05;
 
 /// Largest eigenvalue of each element over the mass at its corners [1/s²]. No eigenvalue of the sheet is above the
 /// largest of these (Irons and Treharne 1971).
@@ -74,12 +67,12 @@ pub(super) fn hinge_limits(sheet: &Sheet) -> Vec<f64> {
     sheet.hinges.iter().map(worst).collect()
 }
 
-/// Shares of stiffness that bring the outliers among `limits` down to all others.
-pub(super) fn without_outliers(limits: &[f64]) -> Vec<f64> {
+/// Shares of stiffness that bring the outliers among `limits`, a share of them, down to all others.
+pub(super) fn without_outliers(limits: &[f64], outliers: f64) -> Vec<f64> {
     let mut all = limits.to_vec();
     all.sort_unstable_by(f64::total_cmp);
     let n = all.len().max(1);
-    let rank = ((n as f64 * (1.0 - OUTLIERS)) as usize).min(n - 1);
+    let rank = ((n as f64 * (1.0 - outliers)) as usize).min(n - 1);
     let usual = all.get(rank).copied().unwrap_or(1.0);
     limits
         .iter()
@@ -89,7 +82,12 @@ pub(super) fn without_outliers(limits: &[f64]) -> Vec<f64> {
 
 /// Shares of the elements' stiffness at which no mode is faster than `limit` [1/s²]. `limits` bounds each element by
 /// itself, `largest` returns the eigenvalue of the whole. Only elements that are too stiff are softened.
-pub(super) fn soften(limit: f64, limits: &[f64], largest: impl Fn(&[f64]) -> f64) -> Vec<f64> {
+pub(super) fn soften(
+    limit: f64,
+    limits: &[f64],
+    settings: &SolverSettings,
+    largest: impl Fn(&[f64]) -> f64,
+) -> Vec<f64> {
     let mut keep = vec![1.0; limits.len()];
     let whole = largest(&keep);
     if whole <= limit {
@@ -106,12 +104,12 @@ pub(super) fn soften(limit: f64, limits: &[f64], largest: impl Fn(&[f64]) -> f64
         let now = largest(&keep);
         if now <= limit {
             stable = Some(keep.clone());
-            if now > NEAR_LIMIT * limit {
+            if now > settings.near_limit * limit {
                 break;
             }
         }
-        let correction = limit / now.max(f64::MIN_POSITIVE) * RELAXATION;
-        bound *= correction.clamp(CORRECTION[0], CORRECTION[1]);
+        let correction = limit / now.max(f64::MIN_POSITIVE) * settings.relaxation;
+        bound *= correction.clamp(settings.correction[0], settings.correction[1]);
     }
     stable.unwrap_or_else(|| {
         let now = largest(&keep);

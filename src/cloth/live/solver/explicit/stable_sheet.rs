@@ -7,6 +7,7 @@ use super::stability::{
     FlatSheet, bending_eigenvalue, element_limits, hinge_limits, soften, without_outliers,
 };
 use crate::live::{Element, Sheet};
+use crate::settings::SolverSettings;
 use std::collections::BTreeMap;
 
 /// Step that a sheet is made stable for.
@@ -27,7 +28,7 @@ pub struct StepSpec {
 pub struct StableSheet {
     /// Mean share of the membrane stiffness that is kept, by area; below 1 where the step is too long.
     pub kept_stiffness: f64,
-    /// Number of elements that keep less than 99 %.
+    /// Number of elements that keep less than all.
     pub soft_elements: usize,
     pub(super) inverse_mass: Vec<f32>,
     pub(super) ends: Vec<[u32; 2]>,
@@ -44,26 +45,17 @@ pub struct StableSheet {
     pub(super) damping: f32,
 }
 
-/// Safety factor of the stability limit (ratio of eigenvalues): strain stiffens elements, and the eigenvalue is a lower
-/// bound. With 1.12 a crumpled square on the sphere diverged, with 1.2 none did.
-const MARGIN: f64 = 1.3;
-/// Share of its stiffness below which an element counts as soft. Affects reports only.
-const SOFT: f64 = 0.99;
-/// Angle of a hinge that counts as flat at rest (rad): rounding of the coordinates of a flat sheet.
-const FLAT: f64 = 1e-4;
-/// Fewest and most substeps between two evaluations of bending. Fewer cost more than narrow hinges need; more gain little.
-const BENDING_INTERVAL: [usize; 2] = [3, 6];
-
 impl StableSheet {
     /// Compiles a sheet for a step.
-    pub fn new(sheet: &Sheet, spec: &StepSpec) -> Self {
+    pub fn new(sheet: &Sheet, spec: &StepSpec, settings: &SolverSettings) -> Self {
         let edges = SortedEdges::new(sheet);
         // Symplectic Euler is stable to 4/h²; extrapolation lowers that.
-        let limit = 4.0 / (spec.h * spec.h * (1.0 + 2.0 * spec.lookahead) * MARGIN);
-        let filter = MassFilter::of_sheet(sheet, edges.ends(), spec.filter_degree);
+        let ahead = 1.0 + 2.0 * spec.lookahead;
+        let limit = 4.0 / (spec.h * spec.h * ahead * settings.stability_margin);
+        let filter = MassFilter::of_sheet(sheet, edges.ends(), spec.filter_degree, settings);
         let limits = element_limits(sheet);
         let flat = FlatSheet::new(sheet);
-        let keep = soften(limit, &limits, |k| flat.eigenvalue(k, &filter));
+        let keep = soften(limit, &limits, settings, |k| flat.eigenvalue(k, &filter));
         let area: f64 = sheet.elements.iter().map(|e| e.area).sum();
         let kept: f64 = sheet
             .elements
@@ -71,14 +63,16 @@ impl StableSheet {
             .zip(&keep)
             .map(|(e, k)| e.area * k)
             .sum();
-        let (bend, bent) = bending(sheet, spec, &edges, &filter.identity());
+        let identity = filter.identity();
+        let keep_bend = kept_bending(sheet, spec, &identity, settings);
+        let (bend, bent) = bending(sheet, &keep_bend, &edges, settings.flat);
         let diagonal = |(ends, flat)| Diagonal {
             ends,
             flat: flat as f32,
         };
         Self {
             kept_stiffness: kept / area.max(f64::MIN_POSITIVE),
-            soft_elements: keep.iter().filter(|k| **k < SOFT).count(),
+            soft_elements: keep.iter().filter(|k| **k < 1.0).count(),
             inverse_mass: sheet.mass.iter().map(|m| (1.0 / m) as f32).collect(),
             triangles: triangles(sheet, &keep, &edges),
             rest: edges.0.iter().map(|e| e.1 as f32).collect(),
@@ -95,28 +89,29 @@ impl StableSheet {
     pub fn vertices(&self) -> usize {
         self.inverse_mass.len()
     }
-    /// Substeps of `h` seconds that bending forces may be kept for, within `BENDING_INTERVAL`: all but a few small
-    /// hinges keep all their stiffness.
-    pub fn bending_interval(sheet: &Sheet, h: f64) -> usize {
-        let keep = without_outliers(&hinge_limits(sheet));
-        let unfiltered = MassFilter::of_sheet(sheet, ends(sheet), 0);
+    /// Substeps of `h` seconds that bending forces may be kept for, within the settings' range: all but a few small hinges
+    /// keep all their stiffness.
+    pub fn bending_interval(sheet: &Sheet, h: f64, settings: &SolverSettings) -> usize {
+        let keep = without_outliers(&hinge_limits(sheet), settings.outliers);
+        let unfiltered = MassFilter::of_sheet(sheet, ends(sheet), 0, settings);
         let fastest = bending_eigenvalue(sheet, &keep, &unfiltered)
             .max(f64::MIN_POSITIVE)
             .sqrt();
-        ((1.0 / (fastest * h)) as usize).clamp(BENDING_INTERVAL[0], BENDING_INTERVAL[1])
+        let [fewest, most] = settings.bending_interval;
+        ((1.0 / (fastest * h)) as usize).clamp(fewest, most)
     }
-    /// Longest step at which all but a few small elements keep all their stiffness (s).
-    pub fn stable_step(sheet: &Sheet, lookahead: f64, filter_degree: usize) -> f64 {
-        Self::stable_steps(sheet, lookahead)(filter_degree)
-    }
-    /// [`Self::stable_step`] as a function of the filter degree.
-    pub fn stable_steps(sheet: &Sheet, lookahead: f64) -> impl Fn(usize) -> f64 {
-        let keep = without_outliers(&element_limits(sheet));
+    /// Longest step at which all but a few small elements keep all their stiffness (s), by the filter degree.
+    pub fn stable_steps(
+        sheet: &Sheet,
+        lookahead: f64,
+        settings: &SolverSettings,
+    ) -> impl Fn(usize) -> f64 {
+        let keep = without_outliers(&element_limits(sheet), settings.outliers);
         let flat = FlatSheet::new(sheet);
         move |degree| {
-            let filter = MassFilter::of_sheet(sheet, ends(sheet), degree);
-            let fastest = flat.eigenvalue(&keep, &filter);
-            (4.0 / (fastest.max(f64::MIN_POSITIVE) * MARGIN * (1.0 + 2.0 * lookahead))).sqrt()
+            let filter = MassFilter::of_sheet(sheet, ends(sheet), degree, settings);
+            let fastest = flat.eigenvalue(&keep, &filter).max(f64::MIN_POSITIVE);
+            (4.0 / (fastest * settings.stability_margin * (1.0 + 2.0 * lookahead))).sqrt()
         }
     }
 }
@@ -165,23 +160,28 @@ fn triangles(sheet: &Sheet, keep: &[f64], edges: &SortedEdges) -> Vec<EdgeTriang
 /// Pairs of vertices with the bending stiffness between them (N/m), and hinges that are bent at rest.
 type Bending = (Vec<([u32; 2], f32)>, Vec<CurvedHinge>);
 
-fn bending(
+/// Shares of the hinges' stiffness at which bending is stable.
+fn kept_bending(
     sheet: &Sheet,
     spec: &StepSpec,
-    edges: &SortedEdges,
     unfiltered: &MassFilter,
-) -> Bending {
+    settings: &SolverSettings,
+) -> Vec<f64> {
     // Forces that are kept for a time t are stable for ω t ≤ 1.
     let limit = 1.0 / (spec.h * spec.bending_interval.max(1) as f64).powi(2);
-    let keep = soften(limit, &hinge_limits(sheet), |k| {
+    soften(limit, &hinge_limits(sheet), settings, |k| {
         bending_eigenvalue(sheet, k, unfiltered)
-    });
+    })
+}
+
+/// Bending of hinges with these shares of their stiffness; `flat`: angle of one that counts as flat (rad).
+fn bending(sheet: &Sheet, keep: &[f64], edges: &SortedEdges, flat: f64) -> Bending {
     let mut pairs = BTreeMap::<[u32; 2], f64>::new();
     let mut bent = Vec::new();
-    for (h, keep) in sheet.hinges.iter().zip(&keep) {
+    for (h, keep) in sheet.hinges.iter().zip(keep) {
         let w = h.w * keep;
         let size = h.c.iter().map(|c| c.abs()).sum::<f64>();
-        if h.rest > FLAT * size * edges.length(h.v[0], h.v[1]) {
+        if h.rest > flat * size * edges.length(h.v[0], h.v[1]) {
             bent.push(CurvedHinge {
                 v: h.v,
                 c: h.c.map(|c| c as f32),

@@ -1,11 +1,25 @@
 //! Sheets and a laboratory for tests of the explicit solver.
 
 use super::halo::HaloExchange;
-use super::{ContactPlane, PatchModel, PatchState, Pin, StableSheet, StepSpec, Substep, V4};
+use super::{
+    ContactPlane, PatchModel, PatchState, Pin, Recovery, StableSheet, StepSpec, Substep, V4,
+};
 use crate::live::Sheet;
+use crate::settings::SolverSettings;
 use tryon_garment::{IsotropicSolid, Material};
 use tryon_geometry::math::V3d;
 use tryon_geometry::mesh::Face;
+
+/// Recovery at 1 m/s.
+pub(super) const RECOVERY: Recovery = Recovery {
+    share: 0.2,
+    speed: 1.0,
+};
+
+/// Longest stable step of a sheet at the usual lookahead (s).
+pub(super) fn stable_step(sheet: &Sheet, filter_degree: usize) -> f64 {
+    StableSheet::stable_steps(sheet, 0.25, &SolverSettings::default())(filter_degree)
+}
 
 /// An isotropic sheet without air drag: 0.18 kg/m², 1000 N/m, Poisson 0.25.
 pub(super) fn cotton(bending: f64) -> Material {
@@ -88,14 +102,14 @@ impl Lab {
         patches: usize,
         filter_degree: usize,
     ) -> Self {
-        let bending_interval = StableSheet::bending_interval(&sheet, h);
+        let bending_interval = StableSheet::bending_interval(&sheet, h, &SolverSettings::default());
         let spec = StepSpec {
             h,
             lookahead: 0.25,
             bending_interval,
             filter_degree,
         };
-        let stable = StableSheet::new(&sheet, &spec);
+        let stable = StableSheet::new(&sheet, &spec, &SolverSettings::default());
         let models = stable.compile_patches(patches, 8 * (1 + filter_degree) + 8, 0);
         let mut lab = Self {
             bending_interval,
@@ -171,7 +185,7 @@ impl Lab {
                 m.update_bending(f, h * kept * 0.5, usize::MAX);
             }
             m.integrate_velocities(f, &step, planes, pins);
-            m.resolve_contacts(planes, 0.0, h, 1.0);
+            m.resolve_contacts(planes, 0.0, h, RECOVERY);
             m.apply_pins(pins, 0.0, h);
             m.integrate_positions(f, &step, f32::INFINITY);
         }

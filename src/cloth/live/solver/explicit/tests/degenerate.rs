@@ -1,12 +1,14 @@
 //! Numbers at their limits: single precision against double, extreme stiffness and shape ratios, degenerate meshes.
 
-use crate::live::solver::explicit::StableSheet;
 use crate::live::solver::explicit::edge_stiffness::TriangleSprings;
 use crate::live::solver::explicit::mass_filter::MassFilter;
 use crate::live::solver::explicit::stability::element_limits;
 use crate::live::solver::explicit::stable_sheet::ends;
-use crate::live::solver::explicit::test_sheets::{Lab, Mesh, cotton, distance, grid, sheet};
+use crate::live::solver::explicit::test_sheets::{
+    Lab, Mesh, cotton, distance, grid, sheet, stable_step,
+};
 use crate::live::{ClothError, Sheet};
+use crate::settings::SolverSettings;
 use nalgebra::{Matrix2, Vector2, Vector3};
 use tryon_geometry::math::V3d;
 
@@ -62,7 +64,12 @@ impl Oracle<'_> {
         for (a, m) in a.iter_mut().zip(&self.sheet.mass) {
             *a = *a / *m + V3d::new(0.0, -9.81, 0.0);
         }
-        let filter = MassFilter::of_sheet(self.sheet, ends(self.sheet), self.smooth);
+        let filter = MassFilter::of_sheet(
+            self.sheet,
+            ends(self.sheet),
+            self.smooth,
+            &SolverSettings::default(),
+        );
         let mut planes = [[0, 1], [2, 2]].map(|[p, q]| {
             a.iter()
                 .map(|a| Vector2::new(a[p], a[q]))
@@ -95,7 +102,7 @@ fn single_precision_follows_double_precision() {
         .collect();
     for smooth in [0, 2] {
         let s = sheet(&faces, &rest, x.len(), &m);
-        let h = 0.5 * StableSheet::stable_step(&s, 0.25, smooth);
+        let h = 0.5 * stable_step(&s, smooth);
         let mut lab = Lab::with_filter(s, &x, h, 1, smooth);
         lab.place(&wild, &spin);
         assert_eq!(lab.stable.soft_elements, 0);

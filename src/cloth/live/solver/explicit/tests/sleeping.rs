@@ -1,7 +1,8 @@
 //! Sleeping vertices against held ones.
 
-use crate::live::solver::explicit::test_sheets::{cotton, grid, hold, sheet};
+use crate::live::solver::explicit::test_sheets::{cotton, grid, hold, sheet, stable_step};
 use crate::live::solver::explicit::{PatchModel, PatchState, StableSheet, StepSpec, Substep, V4};
+use crate::settings::SolverSettings;
 use tryon_geometry::math::V3d;
 
 const STEPS: usize = 300;
@@ -41,14 +42,15 @@ fn cloth_beside_sleeping_cloth_moves_as_beside_held_cloth() {
     let (x, faces, rest) = grid(24, 16, 0.02, 0.02);
     for filter_degree in 0..3 {
         let s = sheet(&faces, &rest, x.len(), &cotton(1e-5));
-        let h = StableSheet::stable_step(&s, 0.25, filter_degree);
+        let h = stable_step(&s, filter_degree);
         let spec = StepSpec {
             h,
             lookahead: 0.25,
             bending_interval: 3,
             filter_degree,
         };
-        let f = &StableSheet::new(&s, &spec).compile_patches(1, 0, 64)[0];
+        let f =
+            &StableSheet::new(&s, &spec, &SolverSettings::default()).compile_patches(1, 0, 64)[0];
         let half = f.islands[f.islands.len() / 2];
         let [sleeping, held] = [true, false].map(|sleeps| fall(f, &x, h as f32, half, sleeps));
         let n = x.len();

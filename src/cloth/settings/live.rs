@@ -1,0 +1,238 @@
+//! Settings of the real-time simulator.
+
+use super::{
+    CollisionConfig, MapSettings, RepairSettings, SolverSettings, StillnessSettings, settings,
+};
+use crate::contact::MapDetail;
+use crate::live::ClothError;
+use tryon_geometry::math::{Camera, Rigid, V3d, World};
+use tryon_geometry::par::Par;
+
+settings! {
+    /// Settings of the simulation of one outfit.
+    pub struct Config {
+        /// Most substeps in 1/60 s. Triangles too stiff for these are softened; fewer strain cloth more, more cost time.
+        pub most_steps: usize = 72,
+        /// Time ahead of the positions at which forces are evaluated, in substeps, 0 to 1: damps ringing.
+        #[serde(rename = "ahead")]
+        pub force_lookahead: f64 = 0.25,
+        /// Vertices of a patch, the work of one thread. Changes bits, so it is a setting and not the machine's.
+        pub patch: usize = 6000,
+        /// Gravity, m/s².
+        pub gravity: [f64; 3] = [0.0, -9.81, 0.0],
+        /// Distance of the outermost layer from the skin, metres; the others lie evenly between.
+        pub offset: f64 = 0.005,
+        /// Horizontal viewing direction of the real camera, world x and z: its depth map is the fine one.
+        pub camera_toward: [f32; 2] = [0.0, -1.0],
+        /// Resolution of the depth maps of the body.
+        pub map_detail: MapDetail = MapDetail::InView,
+        /// Keep inner layers below outer ones.
+        pub layers: bool = true,
+        /// Keep the folds of a garment apart.
+        pub self_collision: bool = true,
+        /// Distance between cloth and cloth, metres.
+        pub thickness: f64 = 0.003,
+        /// Margin of the skin query beyond a garment's distance and motion, metres; larger while panels are sewn.
+        pub reach: f64 = 0.008,
+        /// Displacement between steps from which on body vertices are followed fully, metres; 0 for an exact body.
+        #[serde(rename = "steady")]
+        pub noise_deadband: f64 = 0.0,
+        /// Let cloth sleep when it and the body are still.
+        pub sleep: bool = true,
+        /// Let islands of it sleep while others move, if it may sleep at all.
+        pub sleep_regions: bool = true,
+        /// Time between two intersection queries of a garment, s; 0 for none.
+        pub untangle: f64 = 0.13,
+        /// Least distance of two corners across an edge, over that of the flat sheet: ½ lets a fold close to 60°, 0 any.
+        #[serde(rename = "sharpest")]
+        pub min_fold_ratio: f64 = 0.6,
+        /// Skip queries of vertices that cannot have come near skin or folds since their last one.
+        #[serde(rename = "skip_far")]
+        pub cull_distant: bool = true,
+        /// Speed limit of cloth, m/s: keeps one bad frame from becoming many.
+        pub max_speed: f32 = 12.0,
+        /// Mean displacement of the body in a step beyond which it has teleported, metres.
+        pub teleport: f64 = 0.2,
+        /// Threads.
+        #[serde(skip)]
+        pub par: Par = Par::Rayon,
+        /// The collision body; its dead band, clearance and threads follow from the settings above.
+        pub body: CollisionConfig = CollisionConfig::default(),
+        /// Virtual depth maps.
+        pub maps: MapSettings = MapSettings::default(),
+        /// Division of time.
+        pub time: StepSettings = StepSettings::default(),
+        /// Contact.
+        pub contact: ClothContactSettings = ClothContactSettings::default(),
+        /// Explicit solver.
+        pub solver: SolverSettings = SolverSettings::default(),
+        /// Thresholds of sleep.
+        pub stillness: StillnessSettings = StillnessSettings::default(),
+        /// Repair.
+        pub repair: RepairSettings = RepairSettings::default(),
+    }
+
+    /// Division of a step's time.
+    pub struct StepSettings {
+        /// Range of time steps, s: shorter and longer ones are clamped.
+        pub range: [f64; 2] = [1e-4, 0.1],
+        /// Time between two contact queries, s: at 3 m/s a limb moves 25 mm, half the reach of a query.
+        pub contact_interval: f64 = 1.0 / 120.0,
+        /// The same for a body slower than `calm_speed`.
+        pub calm_interval: f64 = 1.0 / 60.0,
+        /// Speed of a calm body's fastest vertex, m/s.
+        pub calm_speed: f32 = 1.0,
+        /// Share of an interval by which a step may be longer without another one: 1/30 s are two calm intervals.
+        pub interval_slack: f64 = 1e-3,
+        /// Depth maps rendered a second, in turn: 15 of each direction. Twice as many cost time and keep cloth no higher.
+        pub maps_per_second: f64 = 60.0,
+    }
+
+    /// Settings of contact with skin and cloth.
+    pub struct ClothContactSettings {
+        /// Rate at which anchors of strength ½ approach their target, 1/s.
+        pub anchor_rate: f64 = 120.0,
+        /// Largest distance at which skin is queried in an interval, metres.
+        pub max_reach: f32 = 0.04,
+        /// Clearance between two body parts below which cloth keeps to its own half, metres.
+        pub shared_gap: f32 = 0.03,
+        /// Its distance from the middle then, metres.
+        pub middle_gap: f32 = 0.00125,
+        /// Distance outside a vertex within which an outer layer constrains it, metres.
+        pub layer_reach: f32 = 0.02,
+        /// Distance between layers, metres: no more than between two of them on the skin.
+        pub layer_gap: f32 = 0.002,
+        /// Distance outside an outer layer beyond which it is unrelated (a sleeve, the other side), metres.
+        pub layer_depth: f32 = 0.15,
+        /// Distance below a hem within which an inner layer may stand out as far, metres: an edge of a triangle.
+        pub hem: f32 = 0.03,
+        /// Height over the skin from which on cloth hangs by itself, metres: the bell of a skirt supports no shirt.
+        pub hanging: f32 = 0.02,
+        /// Distance kept from the layers below, metres: above `layer_gap` by what they may rise in a step.
+        pub layer_margin: f32 = 0.0025,
+        /// Largest distance of an outer layer from the skin, metres. With 20 mm skirts rode up no less.
+        pub max_height: f32 = 0.012,
+        /// Height above the skin to which cloth is projected, metres: less than a fabric's thickness.
+        pub projected_height: f32 = 5e-4,
+        /// Depth in another body part beyond which cloth stays, metres: it may have come from the other side.
+        pub max_other_depth: f32 = 0.01,
+        /// Folds of one garment.
+        pub folds: SelfContactSettings = SelfContactSettings::default(),
+    }
+
+    /// Settings of the contact of a sheet with itself.
+    pub struct SelfContactSettings {
+        /// Largest closing speed of folds, m/s.
+        pub closing: f32 = 1.0,
+        /// Largest distance of a contact, metres: the motion of an interval of 8 ms. With 11 mm in a dance and 20 mm while
+        /// dressing folds hold each other over air, and a skirt tears (stretch 176 % instead of 7 %).
+        pub max_reach: f32 = 0.01,
+        /// The same in edge lengths: the third ring, the first that counts as another fold, lies farther away unless a fold is
+        /// sharper than the mesh resolves.
+        pub reach_edges: f32 = 0.85,
+        /// Largest thickness between folds, in edge lengths; more holds sharp folds open.
+        pub thickness_edges: f32 = 0.25,
+        /// Margin of the candidate query beyond need, in edge lengths: motion until the next query.
+        pub margin_edges: f32 = 0.75,
+        /// Friction of cloth on cloth: below the measured 0.3, as planes renewed every interval resist sliding already.
+        pub friction: f32 = 0.1,
+    }
+}
+
+impl Config {
+    /// For a body that is tracked by a camera.
+    pub fn tracked() -> Self {
+        Self {
+            // 95 % of a standing body's vertices move less between frames (3 mm, Kinect v1 at 2.4 m); 5 mm left twice the noise.
+            noise_deadband: 8e-3,
+            ..Self::default()
+        }
+    }
+    /// The same for a camera with this pose. A vertical optical axis keeps the direction.
+    #[must_use]
+    pub fn seen_from(self, world_from_camera: &Rigid<World, Camera>) -> Self {
+        /// Sine of the angle to the vertical below which the axis has no horizontal direction.
+        const LEVEL: f64 = 1e-3;
+        let axis = world_from_camera.vector(&V3d::z());
+        if axis.x.hypot(axis.z) < LEVEL {
+            return self;
+        }
+        Self {
+            camera_toward: [axis.x as f32, axis.z as f32],
+            ..self
+        }
+    }
+    /// Distance of layer `order` of `count` from the skin, metres: evenly between the skin and the outermost layer.
+    pub fn layer_offset(&self, order: usize, count: usize) -> f64 {
+        self.offset * (order + 1) as f64 / count as f64
+    }
+    /// The body as cloth of these settings meets it: two layers fit between parts that press on each other.
+    pub(crate) fn collision(&self) -> CollisionConfig {
+        CollisionConfig {
+            noise_deadband: self.noise_deadband,
+            clearance: (2.0 * self.offset + self.thickness) as f32,
+            par: self.par,
+            ..self.body
+        }
+    }
+    /// Names the first setting out of range.
+    pub fn check(&self) -> Result<(), ClothError> {
+        let lengths = [self.noise_deadband, self.untangle];
+        let faults = [
+            (
+                self.most_steps == 0 || self.patch == 0,
+                "most_steps, patch",
+                "both must be at least 1",
+            ),
+            (
+                !(0.0..=1.0).contains(&self.force_lookahead),
+                "ahead",
+                "must be between 0 and 1 step",
+            ),
+            (
+                !(self.offset.is_finite()
+                    && self.teleport > 0.0
+                    && lengths.iter().all(|l| *l >= 0.0)),
+                "offset, teleport, steady, untangle",
+                "they must be finite, teleport positive, steady and untangle not negative",
+            ),
+            (
+                !(0.0..1.0).contains(&self.min_fold_ratio),
+                "sharpest",
+                "must be at least 0 and less than 1",
+            ),
+        ];
+        let fault = faults.into_iter().find(|f| f.0);
+        fault.map_or(Ok(()), |(_, field, why)| Err(ClothError::field(field, why)))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::UnitQuaternion;
+
+    #[test]
+    fn fine_map_faces_the_camera_and_a_vertical_axis_keeps_the_default() {
+        let turned = |axis, angle: f64| -> Rigid<Camera, Camera> {
+            Rigid::from_parts(V3d::zeros(), UnitQuaternion::from_axis_angle(&axis, angle))
+        };
+        let level = Rigid::<World, Camera>::level(1.2);
+        let toward = |camera: Rigid<Camera, Camera>| {
+            let [x, z] = Config::tracked().seen_from(&(level * camera)).camera_toward;
+            [x / x.hypot(z), z / x.hypot(z)]
+        };
+        let close =
+            |a: [f32; 2], b: [f32; 2]| (a[0] - b[0]).abs() < 1e-6 && (a[1] - b[1]).abs() < 1e-6;
+        // Tilted down or mounted upright the camera faces −z, the default.
+        let default = Config::default().camera_toward;
+        let right = std::f64::consts::FRAC_PI_2;
+        assert!(close(toward(turned(V3d::x_axis(), -0.3)), default));
+        assert!(close(toward(turned(V3d::z_axis(), right)), default));
+        // Turned to its right (about its own axis down) it faces +x.
+        let (sin, cos) = 0.5f32.sin_cos();
+        assert!(close(toward(turned(V3d::y_axis(), 0.5)), [sin, -cos]));
+        // Straight down: no horizontal direction.
+        assert!(close(toward(turned(V3d::x_axis(), -right)), default));
+    }
+}

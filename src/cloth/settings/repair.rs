@@ -1,0 +1,63 @@
+//! Settings of the repair of worn garments.
+
+use super::settings;
+
+settings! {
+    /// Settings of the repair of worn garments.
+    pub struct RepairSettings {
+        /// Largest displacement of an untangling query, metres. With 5 mm armpits without clearance for two layers stretch by
+        /// 18 %.
+        pub max_displacement: f64 = 0.003,
+        /// Largest displacement of smoothed vertices, metres.
+        pub max_smoothing: f64 = 0.015,
+        /// Height above the skin below which nothing is moved, metres: less than a fabric's thickness.
+        pub min_height: f64 = 5e-4,
+        /// Distance beyond which skin does not constrain the displacement, metres.
+        pub near_skin: f64 = 0.02,
+        /// Time after which a still body's garments are not queried, s: what has no clearance would never rest.
+        pub max_still_time: f64 = 1.0,
+        /// Vertices that determine a rotation; joints with fewer move with the whole body.
+        pub joint_vertices: f64 = 12.0,
+        /// Untangling of a sheet.
+        pub untangler: UntanglerSettings = UntanglerSettings::default(),
+        /// Rings of sleeves.
+        pub sleeves: SleeveSettings = SleeveSettings::default(),
+    }
+
+    /// Settings of the untangling of a sheet.
+    pub struct UntanglerSettings {
+        /// Largest motion of an edge against a triangle in one iteration (m). A third of it leaves intersections from one pose
+        /// to the next.
+        pub step: f64 = 0.003,
+        /// Distance at which vertices from the wrong side are placed (m).
+        pub gap: f64 = 0.001,
+        /// Least sine of the angle between an edge and a triangle: flatter ones would displace the contour without bound.
+        pub min_sine: f64 = 0.05,
+        /// Turn of the contour (length of a sum of unit vectors) below which the displacement is less than a whole step.
+        pub straight: f64 = 1.0,
+        /// Weight of the edge's steepness against the contour's direction (Volino & Magnenat-Thalmann, eq. 5).
+        pub steepness: f64 = 2.0,
+        /// Share of its sheet's vertices below which a part that is cut off is on the wrong side.
+        pub cut_off: f64 = 0.3,
+    }
+
+    /// Settings of the rings of sleeves.
+    pub struct SleeveSettings {
+        /// Distance between two rings of skin, metres.
+        pub skin_ring: f64 = 0.02,
+        /// Width of a ring of cloth, metres.
+        pub ring: f32 = 0.04,
+        /// Its least width in edge lengths: narrower ones have gaps.
+        pub ring_edges: f32 = 1.2,
+        /// Largest distance of the armhole from the shoulder along the arm, metres.
+        pub armhole: f32 = 0.3,
+        /// Largest distance of the next ring along the arm, in distances on the cloth.
+        pub max_spacing: f32 = 1.5,
+        /// Distance of a recovered ring, likewise.
+        pub recovered_spacing: f32 = 0.9,
+        /// Half the length over which the direction of an arm is taken, metres.
+        pub direction: f32 = 0.03,
+        /// Step of the scan for the nearest point of a centre line, metres.
+        pub scan: f32 = 0.005,
+    }
+}
