@@ -99,7 +99,7 @@ impl Hood {
             let corner = self
                 .model
                 .candidate(frame, v, &p, &self.search, &mut self.neighbour_of);
-            let Some(hit) = corner.and_then(|(c, _)| self.model.other_fold(frame, v, &p, c)) else {
+            let Some(hit) = corner.and_then(|c| self.model.other_fold(frame, v, &p, c)) else {
                 continue;
             };
             let [a, b, c] = self.model.surface.faces()[hit.face as usize];

@@ -233,16 +233,6 @@ mod tests {
     fn what_the_camera_sees_is_proposed_as_well_as_with_fine_maps_everywhere() {
         let [all, view, none] =
             [MapDetail::Everywhere, MapDetail::InView, MapDetail::Nowhere].map(misses);
-        eprintln!("excess distance of proposals, mm: front mean, worst; back mean, worst");
-        for (name, m) in [("everywhere", all), ("in view", view), ("nowhere", none)] {
-            eprintln!(
-                "{name}: {:.2} {:.2}; {:.2} {:.2}",
-                m[0][0] * 1e3,
-                m[0][1] * 1e3,
-                m[1][0] * 1e3,
-                m[1][1] * 1e3
-            );
-        }
         // In view (flanks too): within a millimetre of fine maps everywhere. Elsewhere: within a coarse pixel of the nearest.
         assert!(view[0][0] < all[0][0] + 1e-3, "{view:?} {all:?}");
         let coarse = MapSettings::default().coarse;

@@ -40,15 +40,4 @@ impl ElasticExpansion {
         self.gradient.clear();
         self.gradient.resize(vertices, V3d::zeros());
     }
-    /// Product of the Hessian with a vector, shape `[vertices]`, on the model's `pairs`.
-    pub fn multiply(&self, pairs: &[[u32; 2]], x: &[V3d], y: &mut [V3d]) {
-        for ((y, d), x) in y.iter_mut().zip(&self.diagonal).zip(x) {
-            *y = d * x;
-        }
-        for (&[i, j], b) in pairs.iter().zip(&self.off_diagonal) {
-            let (i, j) = (i as usize, j as usize);
-            y[i] += b * x[j];
-            y[j] += b.tr_mul(&x[i]);
-        }
-    }
 }

@@ -224,7 +224,7 @@ impl FanCurvature {
 #[cfg(test)]
 mod tests {
     use super::super::edges::interior_edges;
-    use super::super::test_strips::{StripPattern, TestStrip, strip};
+    use super::super::tests::strips::{StripPattern, TestStrip, strip};
     use super::*;
     use nalgebra::{DMatrix, Rotation2, Vector2};
     use tryon_geometry::math::V3d;

@@ -20,15 +20,7 @@ mod packed;
 pub(crate) mod rest_sheet;
 pub(crate) mod stretch_law;
 #[cfg(test)]
-mod test_cantilever;
-#[cfg(test)]
-mod test_curves;
-#[cfg(test)]
-mod test_picture_frame;
-#[cfg(test)]
-mod test_statics;
-#[cfg(test)]
-mod test_strips;
+mod tests;
 
 pub use assembly::ElasticExpansion;
 pub use bend_law::BendLaw;

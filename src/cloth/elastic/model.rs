@@ -237,13 +237,6 @@ mod tests {
             let (energy, hessian) = evaluate(x, w);
             energy.with_hessian(hessian)
         });
-        let e = expanded(&model, &flat);
-        let mut product = vec![V3d::zeros(); flat.len()];
-        e.multiply(model.pairs(), &state, &mut product);
-        let expected =
-            dense(&model, &e) * DMatrix::from_vec(stacked(&state).len(), 1, stacked(&state));
-        let error = (DMatrix::from_vec(expected.len(), 1, stacked(&product)) - &expected).norm();
-        assert!(error < 1e-12 * expected.norm());
     }
 
     #[test]

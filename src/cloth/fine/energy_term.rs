@@ -56,11 +56,6 @@ impl<S: EnergyElements<V, N>, const V: usize, const N: usize> ElementTerm<S, V, 
             slots: Vec::new(),
         }
     }
-
-    /// The elements.
-    pub fn set(&self) -> &S {
-        &self.set
-    }
 }
 
 /// Sum of `value(i)` for `i < count`, in a fixed order.

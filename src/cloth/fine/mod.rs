@@ -23,24 +23,6 @@ pub(crate) mod step;
 mod stitch;
 mod targets;
 #[cfg(test)]
-mod test_drape_coefficient;
-#[cfg(test)]
-mod test_faults;
-#[cfg(test)]
-mod test_incline;
-#[cfg(test)]
-mod test_momentum;
-#[cfg(test)]
-mod test_sheets;
-#[cfg(test)]
-mod test_skips;
-#[cfg(test)]
-mod test_static_drape;
-#[cfg(test)]
-mod test_stress;
-#[cfg(test)]
-mod test_twist;
-#[cfg(test)]
 mod tests;
 
 pub use crate::settings::{

@@ -306,28 +306,33 @@ mod tests {
     use tryon_geometry::par::{Par, with_threads};
     use tryon_geometry::spatial::intersections;
 
+    /// OBJ text of a grid of cells whose vertex `i`, `j` lies at `at` (x, z); alternating diagonals if asked for.
+    fn grid_obj(cells: [u32; 2], alternates: bool, at: impl Fn(u32, u32) -> [f64; 2]) -> String {
+        let mut obj = String::new();
+        for (i, j) in (0..=cells[0]).flat_map(|i| (0..=cells[1]).map(move |j| (i, j))) {
+            let [x, z] = at(i, j);
+            obj += &format!("v {x:.6} 0 {z:.6}\n");
+        }
+        for (i, j) in (0..cells[0]).flat_map(|i| (0..cells[1]).map(move |j| (i, j))) {
+            let a = i * (cells[1] + 1) + j + 1;
+            let [b, c, d] = [a + 1, a + cells[1] + 1, a + cells[1] + 2];
+            let two = if alternates && (i + j) % 2 == 0 {
+                [[a, b, d], [a, d, c]]
+            } else {
+                [[a, b, c], [b, d, c]]
+            };
+            two.iter()
+                .for_each(|f| obj += &format!("f {} {} {}\n", f[0], f[1], f[2]));
+        }
+        obj
+    }
+
     /// A square sheet of 0.3 m, held at two corners, that falls and swings.
     fn swing(bending: f64) -> Scene {
         const CELLS: u32 = 6;
-        let mut obj = String::new();
-        for i in 0..=CELLS {
-            for j in 0..=CELLS {
-                obj += &format!("v {} 0 {}\n", 0.05 * f64::from(i), 0.05 * f64::from(j));
-            }
-        }
-        for i in 0..CELLS {
-            for j in 0..CELLS {
-                let a = i * (CELLS + 1) + j + 1;
-                obj += &format!(
-                    "f {a} {} {}\nf {} {} {}\n",
-                    a + 1,
-                    a + CELLS + 1,
-                    a + 1,
-                    a + CELLS + 2,
-                    a + CELLS + 1
-                );
-            }
-        }
+        let obj = grid_obj([CELLS; 2], false, |i, j| {
+            [i, j].map(|k| 0.05 * f64::from(k))
+        });
         let scene = serde_json::json!({
             "mesh_obj": obj, "pinned_vertices": [0, CELLS],
             "material": {
@@ -446,30 +451,10 @@ mod tests {
 
     /// A strip of 0.3 m that falls over a thin rod: its halves swing down and meet at about 3 m/s.
     fn strip_over_a_rod() -> Scene {
-        const CELLS: [usize; 2] = [20, 6];
-        let mut obj = String::new();
-        for i in 0..=CELLS[0] {
-            for j in 0..=CELLS[1] {
-                let (x, z) = (
-                    0.3 * i as f64 / CELLS[0] as f64 - 0.145,
-                    0.09 * j as f64 / CELLS[1] as f64 - 0.045,
-                );
-                obj += &format!("v {x:.6} 0 {z:.6}\n");
-            }
-        }
-        for i in 0..CELLS[0] {
-            for j in 0..CELLS[1] {
-                let a = i * (CELLS[1] + 1) + j + 1;
-                let [b, c, d] = [a + 1, a + CELLS[1] + 1, a + CELLS[1] + 2];
-                let two = if (i + j) % 2 == 1 {
-                    [[a, b, c], [b, d, c]]
-                } else {
-                    [[a, b, d], [a, d, c]]
-                };
-                two.iter()
-                    .for_each(|f| obj += &format!("f {} {} {}\n", f[0], f[1], f[2]));
-            }
-        }
+        let obj = grid_obj([20, 6], true, |i, j| {
+            let share = [f64::from(i) / 20.0, f64::from(j) / 6.0];
+            [0.3 * share[0] - 0.145, 0.09 * share[1] - 0.045]
+        });
         let turned = std::f64::consts::FRAC_1_SQRT_2;
         let scene = serde_json::json!({
             "mesh_obj": obj,

@@ -29,14 +29,14 @@ pub struct PairMotion {
 }
 
 impl PairMotion {
-    /// Motion of a contact pair; pairs of smaller features count as vertex and degenerate face.
+    /// Motion of a contact pair.
     ///
     /// # Panics
     /// With fewer positions than the pair's indices need.
     pub fn of(pair: &ContactPair, start: &[V3d], end: &[V3d]) -> Self {
         let kind = match pair {
             ContactPair::EdgeEdge { .. } => PairKind::EdgeEdge,
-            _ => PairKind::VertexFace,
+            ContactPair::VertexFace { .. } => PairKind::VertexFace,
         };
         Self {
             kind,

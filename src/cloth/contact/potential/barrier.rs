@@ -99,6 +99,6 @@ fn mollifier(active: &ActivePair, [a0, a1, b0, b1]: &[V3d; 4]) -> Option<Paralle
         ContactPair::EdgeEdge { .. } => {
             ParallelMollifier::new(a1 - a0, b1 - b0, active.parallel_threshold)
         }
-        _ => None,
+        ContactPair::VertexFace { .. } => None,
     }
 }

@@ -13,8 +13,6 @@ pub enum Curvature {
     /// Sum of the semi-definite parts of its terms, which is not below the second derivative.
     #[default]
     Projected,
-    /// Along the separation only: Gauss–Newton, of rank 1.
-    GaussNewton,
     /// Second derivative as it is, indefinite.
     Exact,
 }
@@ -56,11 +54,6 @@ pub(super) fn compose(
         Curvature::Exact => {
             let d = separation.expansion::<12>();
             d.hessian * b.first + d.gradient * d.gradient.transpose() * b.second
-        }
-        Curvature::GaussNewton => {
-            let along = b.along(separation.squared) / separation.squared;
-            let g = Separation::stack::<12>(&separation.weights, &separation.vector);
-            g * g.transpose() * along.max(0.0)
         }
         Curvature::Projected => by_slides(separation, b),
     };

@@ -194,7 +194,7 @@ mod tests {
         let face = ContactPair::VertexFace { v: 0, f: [1, 2, 3] };
         let active = ActivePair::new(face, &start);
         let push = BARRIER
-            .energy(&active, &start, Curvature::GaussNewton)
+            .energy(&active, &start, Curvature::Projected)
             .expect("contact");
         assert!((push.gradient.fixed_rows::<3>(0).norm() - p.load).abs() < 1e-12 * p.load);
     }
@@ -207,137 +207,15 @@ mod tests {
         assert!(FRICTION.energy(&p, &shifted).gradient.norm() < 1e-13);
     }
 
-    const GRAVITY: f64 = 9.81;
-    const STEP: f64 = 0.01;
-    const MASS: f64 = 0.2;
-
-    /// Point mass on a fixed incline of `slope` (tangent), by implicit Euler and Newton.
-    struct Block {
-        barrier: Barrier,
-        friction: Friction,
-        corners: [V3d; 4],
-        velocity: V3d,
-    }
-
-    impl Block {
-        fn new(slope: f64, coefficient: f64) -> Self {
-            let down = V3d::new(1.0, -slope, 0.0);
-            let out = V3d::new(slope, 1.0, 0.0).normalize();
-            let corners = [
-                out * 1e-3,
-                down * 90.0,
-                down * -10.0 + V3d::z() * 50.0,
-                down * -10.0 - V3d::z() * 50.0,
-            ];
-            Self {
-                barrier: Barrier {
-                    stiffness: 1e-3,
-                    activation: 2e-3,
-                    thickness: 0.0,
-                },
-                friction: Friction {
-                    coefficient,
-                    slip: 1e-3 * STEP,
-                },
-                corners,
-                velocity: V3d::zeros(),
-            }
-        }
-        /// One step, its load lagged four times; returns the Newton iterations of the last.
-        fn step(&mut self) -> usize {
-            let start = self.corners;
-            let active = ActivePair::new(ContactPair::VertexFace { v: 0, f: [1, 2, 3] }, &start);
-            let free = start[0] + (self.velocity - V3d::y() * (GRAVITY * STEP)) * STEP;
-            let mut iterations = 0;
-            for _ in 0..4 {
-                let lagged = FrictionPair::lagged(&active, &self.barrier, &self.corners, &start);
-                iterations = self.newton(&active, lagged.as_ref(), &free);
-            }
-            self.velocity = (self.corners[0] - start[0]) / STEP;
-            iterations
-        }
-        fn value(
-            &self,
-            active: &ActivePair,
-            lagged: Option<&FrictionPair>,
-            free: &V3d,
-            x: &V3d,
-        ) -> f64 {
-            let mut corners = self.corners;
-            corners[0] = *x;
-            0.5 * MASS / (STEP * STEP) * (x - free).norm_squared()
-                + self.barrier.value(active, &corners)
-                + lagged.map_or(0.0, |p| self.friction.value(p, &corners))
-        }
-        fn newton(
-            &mut self,
-            active: &ActivePair,
-            lagged: Option<&FrictionPair>,
-            free: &V3d,
-        ) -> usize {
-            let inertia = MASS / (STEP * STEP);
-            for iteration in 0..100 {
-                let mut gradient = (self.corners[0] - free) * inertia;
-                let mut hessian = Matrix3::identity() * inertia;
-                let barrier = self
-                    .barrier
-                    .energy(active, &self.corners, Curvature::Projected);
-                let friction = lagged.map(|p| self.friction.energy(p, &self.corners));
-                for e in barrier.iter().chain(&friction) {
-                    gradient += e.gradient.fixed_rows::<3>(0);
-                    hessian += e.hessian.fixed_view::<3, 3>(0, 0);
-                }
-                let step = -hessian.cholesky().expect("definite").solve(&gradient);
-                let here = self.corners[0];
-                let now = self.value(active, lagged, free, &here);
-                if -step.dot(&gradient) < 1e-12 * now {
-                    return iteration;
-                }
-                let gap = active.pair.separation(&self.corners).squared.sqrt();
-                let mut length = (0.9 * gap / step.norm()).min(1.0);
-                while length > 1e-9
-                    && self.value(active, lagged, free, &(here + step * length)) > now
-                {
-                    length *= 0.5;
-                }
-                self.corners[0] += step * length;
-            }
-            100
-        }
-    }
-
+    /// At rest on an incline of tan θ, a point creeps by y = s (1 − √(1 − tan θ / μ)): the force there is λ tan θ.
     #[test]
-    fn block_sticks_below_the_angle_of_friction_and_creeps_by_the_smoothing() {
-        let (slope, mu) = (0.3, 0.4);
-        let mut block = Block::new(slope, mu);
-        let most = (0..200).map(|_| block.step()).max();
-        // At rest f₁(y) = tan θ / μ: y = s (1 − √(1 − tan θ / μ)).
-        let creep = block.friction.slip * (1.0 - f64::sqrt(1.0 - slope / mu));
-        let speed = block.velocity.norm() * STEP;
-        assert!(
-            (speed - creep).abs() < 1e-3 * creep,
-            "{speed:e} for {creep:e}"
-        );
-        assert!(most < Some(6), "{most:?}");
-    }
-
-    #[test]
-    fn block_slides_with_the_acceleration_of_coulomb() {
-        let (slope, mu) = (0.5, 0.2);
-        let mut block = Block::new(slope, mu);
-        (0..50).for_each(|_| {
-            block.step();
-        });
-        let early = block.velocity.norm();
-        (0..100).for_each(|_| {
-            block.step();
-        });
-        let cos = 1.0 / (1.0 + slope * slope).sqrt();
-        let expected = GRAVITY * cos * (slope - mu);
-        let acceleration = (block.velocity.norm() - early) / (100.0 * STEP);
-        assert!(
-            (acceleration - expected).abs() < 1e-3 * expected,
-            "{acceleration} for {expected}"
-        );
+    fn creep_of_a_point_that_sticks_has_its_closed_form() {
+        let (p, slope) = (pair(1.0), 0.3);
+        let creep = FRICTION.slip * (1.0 - f64::sqrt(1.0 - slope / FRICTION.coefficient));
+        let across = p.normal.cross(&V3d::x()).normalize();
+        let mut x = START.map(V3d::from);
+        x[0] += across * creep;
+        let force = FRICTION.energy(&p, &x).gradient.fixed_rows::<3>(0).norm();
+        assert!((force / (p.load * slope) - 1.0).abs() < 1e-12, "{force}");
     }
 }

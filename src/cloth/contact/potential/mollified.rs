@@ -20,7 +20,7 @@ pub(super) fn compose_mollified(
     curvature: Curvature,
 ) -> ElementEnergy<12> {
     match curvature {
-        Curvature::Projected | Curvature::GaussNewton => by_terms(separation, b, mollifier),
+        Curvature::Projected => by_terms(separation, b, mollifier),
         Curvature::Exact => product(separation, b, mollifier),
     }
 }

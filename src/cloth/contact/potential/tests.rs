@@ -14,14 +14,12 @@ const BARRIER: Barrier = Barrier {
     thickness: 0.1,
 };
 
-const PAIRS: [ContactPair; 4] = [
+const PAIRS: [ContactPair; 2] = [
     ContactPair::VertexFace { v: 0, f: [1, 2, 3] },
     ContactPair::EdgeEdge {
         a: [0, 1],
         b: [2, 3],
     },
-    ContactPair::VertexEdge { v: 0, e: [1, 2] },
-    ContactPair::VertexVertex { v: [0, 1] },
 ];
 
 fn corners(x: &[f64]) -> [V3d; 4] {
@@ -90,14 +88,12 @@ fn projected_hessians_are_semi_definite_and_not_below_the_exact() {
         for x in points(pair) {
             let exact = energy(pair, &x, 1.0, Curvature::Exact);
             let size = exact.hessian.norm();
-            for curvature in [Curvature::Projected, Curvature::GaussNewton] {
-                let e = energy(pair, &x, 1.0, curvature);
-                assert!((e.value - exact.value).abs() < 1e-12 * exact.value);
-                let error = (e.gradient - exact.gradient).norm();
-                assert!(error < 1e-10 * exact.gradient.norm(), "{error:e}");
-                assert!(e.hessian.symmetric_eigenvalues().min() > -1e-10 * size);
-            }
-            let projected = energy(pair, &x, 1.0, Curvature::Projected).hessian;
+            let e = energy(pair, &x, 1.0, Curvature::Projected);
+            assert!((e.value - exact.value).abs() < 1e-12 * exact.value);
+            let error = (e.gradient - exact.gradient).norm();
+            assert!(error < 1e-10 * exact.gradient.norm(), "{error:e}");
+            assert!(e.hessian.symmetric_eigenvalues().min() > -1e-10 * size);
+            let projected = e.hessian;
             let lowest = (projected - exact.hessian).symmetric_eigenvalues().min();
             assert!(lowest > -1e-9 * size, "{pair:?} {lowest:e} of {size:e}");
             // The nearest semi-definite matrix, for the size of the excess.

@@ -82,7 +82,7 @@ impl ClothContacts<'_> {
                 continue;
             }
             let (v, x) = (f.vertices[i], p.position(i));
-            let Some((corner, _)) = g.candidate(s, v, &x, &search, &mut c.neighbour_of) else {
+            let Some(corner) = g.candidate(s, v, &x, &search, &mut c.neighbour_of) else {
                 c.is_alone[j] = true;
                 continue;
             };

@@ -106,8 +106,6 @@ pub struct Search {
     pub thickness: f32,
     /// Distance within which folds get a plane.
     pub reach: f32,
-    /// Distance of a corner beyond which none of its triangles is within reach.
-    needed: f32,
     /// Radius of the query for corners.
     pub corner: f32,
     /// Folds meet half-way and are released where they part; else each keeps off the other's position.
@@ -160,7 +158,6 @@ impl SelfContactModel {
         Search {
             thickness,
             reach,
-            needed: reach.hypot(beside),
             corner: (reach + margin).hypot(beside),
             halfway: true,
         }
@@ -193,8 +190,8 @@ impl SelfContactModel {
                 .fill(&frame.surface.vertices, 2.0 * search.corner);
         }
     }
-    /// Nearest vertex of another fold to vertex `v` at `x`, and its distance, metres. `neighbour_of` is scratch: for each
-    /// vertex the last one that it was a neighbour of.
+    /// Nearest vertex of another fold to vertex `v` at `x`. `neighbour_of` is scratch: for each vertex the last one that it was
+    /// a neighbour of.
     pub fn candidate(
         &self,
         frame: &SelfContactFrame,
@@ -202,7 +199,7 @@ impl SelfContactModel {
         x: &P3,
         search: &Search,
         neighbour_of: &mut [u32],
-    ) -> Option<(u32, f32)> {
+    ) -> Option<u32> {
         self.excluded
             .row(v as usize)
             .iter()
@@ -213,11 +210,7 @@ impl SelfContactModel {
                 best = (d, j);
             }
         });
-        (best.1 != u32::MAX).then_some((best.1, best.0.sqrt()))
-    }
-    /// Motion of a candidate, or of one that was not found, until it matters, metres.
-    pub fn clearance(search: &Search, corner: Option<(u32, f32)>) -> f32 {
-        corner.map_or(search.corner, |c| c.1) - search.needed
+        (best.1 != u32::MAX).then_some(best.1)
     }
     /// Closest point to vertex `v` at `x` on the triangles around a corner of another fold.
     pub fn other_fold(

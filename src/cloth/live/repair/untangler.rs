@@ -6,7 +6,7 @@
 
 pub use crate::settings::UntanglerSettings;
 use tryon_geometry::math::V3d;
-use tryon_geometry::mesh::Face;
+use tryon_geometry::mesh::{Face, UnionFind};
 use tryon_geometry::par::Par;
 use tryon_geometry::spatial::SelfIntersections;
 
@@ -32,9 +32,6 @@ pub struct Untangler {
     pub finder: SelfIntersections,
     /// Displacement of each vertex in the last iteration, metres, and its weight: 0 without intersection.
     pub displacements: Vec<(V3d, f64)>,
-    /// Union-find parents of the parts that intersecting edges leave.
-    part: Vec<u32>,
-    size: Vec<u32>,
     /// Edges that intersect the sheet an odd number of times.
     odd: Vec<bool>,
     wrong_side: Vec<bool>,
@@ -88,15 +85,13 @@ impl Untangler {
         let mut new = Self {
             finder: SelfIntersections::new(faces, x),
             displacements: Vec::new(),
-            part: Vec::new(),
-            size: Vec::new(),
             odd: Vec::new(),
             wrong_side: Vec::new(),
             whole: Vec::new(),
             active: None,
             settings,
         };
-        new.whole = new.part_sizes(x.len(), false);
+        new.whole = new.part_sizes(x.len(), |_| false);
         new
     }
     /// Moves every intersecting edge against its triangle by a step at most, and wrong-side ends a gap beyond. `weights` are
@@ -212,40 +207,17 @@ impl Untangler {
             *mean += (d - *mean) / *n;
         }
     }
-    fn root(&mut self, mut v: u32) -> u32 {
-        while self.part[v as usize] != v {
-            self.part[v as usize] = self.part[self.part[v as usize] as usize];
-            v = self.part[v as usize];
-        }
-        v
-    }
     /// Vertices of the part of each vertex, connected by edges that are not cut.
-    fn part_sizes(&mut self, n: usize, cut: bool) -> Vec<u32> {
-        self.part.clear();
-        self.part.extend(0..n as u32);
-        self.size.clear();
-        self.size.resize(n, 1);
-        for k in 0..self.finder.edges().len() {
-            if cut && self.odd[k] {
-                continue;
-            }
-            let [a, b] = self.finder.edges()[k].map(|v| self.root(v));
-            if a != b {
-                let (small, large) = if self.size[a as usize] < self.size[b as usize] {
-                    (a, b)
-                } else {
-                    (b, a)
-                };
-                self.part[small as usize] = large;
-                self.size[large as usize] += self.size[small as usize];
-            }
-        }
-        (0..n as u32)
-            .map(|v| {
-                let root = self.root(v);
-                self.size[root as usize]
-            })
-            .collect()
+    fn part_sizes(&self, n: usize, is_cut: impl Fn(usize) -> bool) -> Vec<u32> {
+        let mut parts = UnionFind::new(n);
+        let edges = self.finder.edges().iter().enumerate();
+        edges
+            .filter(|(k, _)| !is_cut(*k))
+            .for_each(|(_, [a, b])| parts.join(*a, *b));
+        let roots: Vec<u32> = (0..n as u32).map(|v| parts.root(v)).collect();
+        let mut size = vec![0; n];
+        roots.iter().for_each(|r| size[*r as usize] += 1);
+        roots.into_iter().map(|r| size[r as usize]).collect()
     }
     /// Marks and counts vertices that edges with an odd number of intersections cut off.
     fn mark_wrong_side(&mut self, n: usize, found: &[(u32, u32)]) -> usize {
@@ -254,7 +226,7 @@ impl Untangler {
         found
             .iter()
             .for_each(|(e, _)| self.odd[*e as usize] ^= true);
-        let parts = self.part_sizes(n, true);
+        let parts = self.part_sizes(n, |k| self.odd[k]);
         self.wrong_side.clear();
         self.wrong_side.extend(
             parts

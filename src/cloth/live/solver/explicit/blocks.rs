@@ -3,6 +3,7 @@
 use super::elements::{CurvedHinge, EdgeTriangle};
 use super::simd::{LANES, Slot, Slots};
 use std::collections::BTreeSet;
+use tryon_geometry::mesh::{Face, edge_faces};
 
 /// Eight pairs of triangles a b c and b a d. A triangle without partner has no stiffness in the second; the last block is
 /// padded with pairs without stiffness.
@@ -35,17 +36,12 @@ pub(super) fn lowest(v: &[Slots; 4]) -> usize {
 
 /// Matching of triangles across edges. Those with the fewest free neighbours choose first, which leaves few unmatched.
 fn partners(all: &[EdgeTriangle]) -> Vec<Option<usize>> {
-    let mut edges: Vec<([u32; 2], usize)> = Vec::with_capacity(3 * all.len());
-    for (n, t) in all.iter().enumerate() {
-        edges.extend(
-            [(0, 1), (1, 2), (2, 0)].map(|(i, j)| ([t.v[i].min(t.v[j]), t.v[i].max(t.v[j])], n)),
-        );
-    }
-    edges.sort_unstable();
-    let mut near = vec![Vec::new(); all.len()];
-    for same in edges.chunk_by(|a, b| a.0 == b.0) {
+    let faces: Vec<Face> = all.iter().map(|t| t.v).collect();
+    let mut near: Vec<Vec<usize>> = vec![Vec::new(); all.len()];
+    for same in edge_faces(&faces).chunk_by(|a, b| a.0 == b.0) {
         for (_, a) in same {
-            near[*a].extend(same.iter().map(|s| s.1).filter(|b| b != a));
+            let others = same.iter().map(|s| s.1).filter(|b| b != a);
+            near[*a as usize].extend(others.map(|b| b as usize));
         }
     }
     let mut free: Vec<usize> = near.iter().map(Vec::len).collect();

@@ -134,15 +134,6 @@ impl PatchState {
             }
         }
     }
-    /// Velocities after a step of `h` under bending, gravity and air drag alone.
-    pub fn integrate_external(&mut self, f: &PatchModel, h: f32, gravity: V4) {
-        let keep = 1.0 / (1.0 + h * f.damping);
-        let fall = gravity.scale(h);
-        let forces = self.scratch.bending.iter().zip(&f.inverse_mass);
-        for (v, (a, m)) in self.velocity.iter_mut().zip(forces) {
-            *v = (*v + a.scale(m * h) + fall).scale(keep);
-        }
-    }
 }
 
 #[cfg(test)]

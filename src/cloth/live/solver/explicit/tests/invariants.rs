@@ -23,22 +23,15 @@ fn free_fall_conserves_momentum_to_rounding() {
         .map(|p| V3d::new(0.3, 2.0, -1.0).cross(p))
         .collect();
     lab.place(&wild, &spin);
-    let mass: f64 = lab.sheet.mass.iter().sum();
+    let masses = lab.sheet.mass.clone();
+    let mass: f64 = masses.iter().sum();
     let mean = |v: &[V3d]| {
-        v.iter()
-            .zip(&lab.sheet.mass)
-            .map(|(v, m)| v * (m / mass))
-            .sum::<V3d>()
+        let weighted = v.iter().zip(&masses).map(|(v, m)| v * (m / mass));
+        weighted.sum::<V3d>()
     };
     let (c0, v0) = (mean(&wild), mean(&spin));
     let n = 2000;
     lab.run(n, &[]);
-    let mean = |v: &[V3d]| {
-        v.iter()
-            .zip(&lab.sheet.mass)
-            .map(|(v, m)| v * (m / mass))
-            .sum::<V3d>()
-    };
     let t = n as f64 * lab.h;
     // Symplectic Euler falls g h² n (n + 1) / 2.
     let fall = V3d::new(0.0, -9.81 * lab.h * lab.h * (n * (n + 1)) as f64 / 2.0, 0.0);
@@ -104,26 +97,6 @@ fn patches_agree_to_rounding_and_repeat_their_bits() {
     assert!(apart < 1e-4, "rounding only: {apart}");
     let again = make(3);
     assert!(three.iter().zip(&again).all(|(a, b)| a == b));
-}
-
-#[test]
-fn sheet_at_rest_stays_and_a_swinging_one_gains_no_energy() {
-    let (x, faces, rest) = grid(6, 6, 0.02, 0.02);
-    let mut airy = cotton(1e-5);
-    airy.damping = 1.0;
-    let mut lab = Lab::new(sheet(&faces, &rest, x.len(), &airy), &x, 2e-4, 1);
-    lab.gravity = V4::default();
-    lab.run(100_000, &[]);
-    let moved = distance(&lab.positions(), &x);
-    assert!(moved < 2e-5, "drift {moved}");
-    let mut lab = Lab::new(sheet(&faces, &rest, x.len(), &cotton(1e-5)), &x, 2e-4, 1);
-    // Pinned at two corners for 10 s.
-    lab.gravity = V4::new(0.0, -9.81, 0.0);
-    for _ in 0..25 {
-        lab.run(2000, &[0, 6]);
-        let e = lab.energy();
-        assert!(e < 1e-5, "energy {e}");
-    }
 }
 
 #[test]

@@ -1,6 +1,6 @@
 //! Momentum of free cloth: a thrown sheet follows a parabola, and two that collide keep the sum.
 
-use super::test_sheets::{GRAVITY, PlanarSheet, assert_free, converged, isotropic, resting};
+use super::sheets::{GRAVITY, PlanarSheet, assert_free, converged, isotropic, resting};
 use super::*;
 use tryon_geometry::math::V3d;
 use tryon_geometry::par::Par;

@@ -1,6 +1,6 @@
 //! Strip between two clamps that turn against each other: a helicoid's energy at first, free of intersections to the end.
 
-use super::test_sheets::{PlanarSheet, assert_free, converged, isotropic, resting};
+use super::sheets::{PlanarSheet, assert_free, converged, isotropic, pinned, resting};
 use super::*;
 use crate::elastic::ClothModel;
 use nalgebra::Rotation3;
@@ -89,10 +89,7 @@ fn energy_of_a_quarter_turn_converges_to_the_helicoids() {
         let state = resting(&start, &[]);
         let mut solver =
             OfflineSolver::new(&cloth, &[], state, settings, Par::Seq).expect("solver");
-        let targets = FrameTargets {
-            pins: &pins,
-            obstacle: &[],
-        };
+        let targets = pinned(&pins);
         let drape = DrapeSettings {
             tolerance: 1e-6,
             ..DrapeSettings::default()
@@ -128,18 +125,12 @@ fn wring(turns: f64, nearer: f64) -> f64 {
     for frame in 1..=frames {
         let share = frame as f64 / frames as f64;
         pins = strip.clamps(&strip.helicoid(turns * TAU * share, nearer * share));
-        let targets = FrameTargets {
-            pins: &pins,
-            obstacle: &[],
-        };
+        let targets = pinned(&pins);
         solver.advance(1.0 / 30.0, &targets).expect("a frame");
         assert_free(&solver, [&strip.sheet.faces, &[]]);
         assert!(strip.energy(&solver.state().now.x).is_finite());
     }
-    let targets = FrameTargets {
-        pins: &pins,
-        obstacle: &[],
-    };
+    let targets = pinned(&pins);
     let drape = DrapeSettings {
         most_steps: 20,
         ..DrapeSettings::default()

@@ -1,6 +1,6 @@
 //! Coulomb's law on an incline: a patch sticks below the angle of friction and slides with a = g (sin θ − μ cos θ) above.
 
-use super::test_sheets::{GRAVITY, PlanarSheet, assert_free, converged, isotropic, resting};
+use super::sheets::{GRAVITY, PlanarSheet, assert_free, converged, isotropic, resting};
 use super::*;
 use nalgebra::Rotation3;
 use tryon_geometry::math::V3d;

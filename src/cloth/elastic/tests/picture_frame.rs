@@ -5,9 +5,9 @@
 //! 2φ = π/2 − γ (Cao et al. 2008, "Characterization of mechanical behavior of woven fabrics: Experimental methods and
 //! benchmark results", Composites A 39). The work of P is that of the membrane stress S = ∂W/∂ε, so T = L S_γ(0, 0, sin γ).
 
-use super::test_curves::WOVEN;
-use super::test_statics::Statics;
-use super::test_strips::{StripPattern, TestStrip, strip};
+use super::curves::WOVEN;
+use super::statics::Statics;
+use super::strips::{StripPattern, TestStrip, strip};
 use super::{BendLaw, ClothModel, ElasticExpansion, ElasticFabric, RestSheet};
 use super::{MeasuredStretch, StretchLaw};
 use crate::settings::ElasticSettings;

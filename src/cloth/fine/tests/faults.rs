@@ -1,7 +1,7 @@
 //! Faults as the caller meets them: no solution, tangled starts, wrong settings and targets.
 
-use super::test_sheets::{PlanarSheet, isotropic, octahedron, resting};
-use super::test_stress::{FRAME, coarse, run, still};
+use super::sheets::{PlanarSheet, isotropic, octahedron, pinned, resting};
+use super::stress::{FRAME, coarse, run, still};
 use super::*;
 use tryon_geometry::math::V3d;
 use tryon_geometry::par::Par;
@@ -37,10 +37,7 @@ fn a_step_without_solution_changes_nothing() {
     let mut lost = solver(coarse());
     run(&mut lost, [&sheet.faces, &faces], 3, still);
     let before = lost.state().clone();
-    let targets = FrameTargets {
-        pins: &pins,
-        obstacle: &[],
-    };
+    let targets = pinned(&pins);
     let fault = lost.advance(FRAME, &targets).expect_err("a fault");
     let expected = NewtonFault::NotFinite { vertex: 7 };
     assert!(
@@ -78,10 +75,7 @@ fn a_step_without_solution_keeps_the_earlier_state() {
         vertex: 7,
         target: V3d::new(0.0, f64::NAN, 0.0),
     }];
-    let targets = FrameTargets {
-        pins: &pins,
-        obstacle: &[],
-    };
+    let targets = pinned(&pins);
     assert!(solver.advance(FRAME, &targets).is_err());
     assert_eq!(*solver.state(), before);
 }
@@ -122,10 +116,7 @@ fn wrong_settings_and_targets_are_named() {
         vertex: 700,
         target: V3d::zeros(),
     }];
-    let pins = FrameTargets {
-        pins: &far,
-        obstacle: &[],
-    };
+    let pins = pinned(&far);
     let fewer = FrameTargets {
         pins: &[],
         obstacle: &body[1..],

@@ -1,7 +1,7 @@
 //! Cusick's drape test (BS 5058): a disc of 30 cm on a support of 18 cm, its shadow over the ring's area.
 
-use super::test_sheets::{
-    GRAVITY, PlanarSheet, converged, exhaustive_crossings, isotropic, resting,
+use super::sheets::{
+    GRAVITY, PlanarSheet, converged, exhaustive_crossings, isotropic, pinned, resting,
 };
 use super::*;
 use crate::elastic::ElasticFabric;
@@ -84,10 +84,7 @@ impl Specimen {
             ..DrapeSettings::default()
         };
         let pins = self.pins();
-        let targets = FrameTargets {
-            pins: &pins,
-            obstacle: &[],
-        };
+        let targets = pinned(&pins);
         let report = solver.drape_to(&drape, &targets, |_| ControlFlow::Continue(()));
         let report = report.expect("a drape");
         assert!(report.settled, "{report:?}");

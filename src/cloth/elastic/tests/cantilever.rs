@@ -1,7 +1,7 @@
 //! Cantilevers of cloth under their own weight against the heavy elastica.
 
-use super::test_statics::Statics;
-use super::test_strips::{StripPattern, TestStrip, strip};
+use super::statics::Statics;
+use super::strips::{StripPattern, TestStrip, strip};
 use super::{BendLaw, ClothModel, ElasticFabric, RestSheet, StretchLaw, Stretching};
 use tryon_geometry::math::V3d;
 

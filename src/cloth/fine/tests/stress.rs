@@ -1,6 +1,6 @@
 //! Scenes that break contact solvers: slivers, pressed folds, piles, tangled starts, extreme strain, speed.
 
-use super::test_sheets::{PlanarSheet, assert_free, isotropic, octahedron, resting};
+use super::sheets::{PlanarSheet, assert_free, isotropic, octahedron, resting};
 use super::*;
 use crate::contact::{ContactMesh, ContactSurface};
 use nalgebra::Vector2;

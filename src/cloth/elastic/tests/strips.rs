@@ -4,7 +4,7 @@ use nalgebra::Vector2;
 
 /// Triangulation of a strip.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum StripPattern {
+pub(in crate::elastic) enum StripPattern {
     /// Squares cut along one diagonal.
     Uniform,
     /// Squares cut along alternating diagonals.
@@ -17,18 +17,23 @@ pub(super) enum StripPattern {
 
 /// Flat mesh of a strip, u along its length.
 #[derive(Clone, Debug)]
-pub(super) struct TestStrip {
-    pub(super) at: Vec<Vector2<f64>>,
-    pub(super) faces: Vec<[u32; 3]>,
+pub(in crate::elastic) struct TestStrip {
+    pub(in crate::elastic) at: Vec<Vector2<f64>>,
+    pub(in crate::elastic) faces: Vec<[u32; 3]>,
     /// Vertices of one column.
-    pub(super) rows: usize,
+    pub(in crate::elastic) rows: usize,
 }
 
 /// Strip from u = −3h/2 to `length`, with `columns` squares of size h along it and `rows` across, v from 0.
 ///
 /// The first three columns of vertices are straight: held, they clamp the strip at u = 0 to second order in h, and no
 /// element at its end sees it bend.
-pub(super) fn strip(length: f64, columns: usize, rows: usize, pattern: StripPattern) -> TestStrip {
+pub(in crate::elastic) fn strip(
+    length: f64,
+    columns: usize,
+    rows: usize,
+    pattern: StripPattern,
+) -> TestStrip {
     let h = length / (columns as f64 - 1.5);
     let across = rows + 1;
     let mut random = Random(match pattern {

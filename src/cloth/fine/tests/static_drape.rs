@@ -1,7 +1,7 @@
 //! Static drape against a catenary, the balance of forces, a long motion, and another start.
 
-use super::test_sheets::{
-    GRAVITY, PlanarSheet, assert_free, converged, isotropic, octahedron, resting,
+use super::sheets::{
+    GRAVITY, PlanarSheet, assert_free, converged, isotropic, octahedron, pinned, resting,
 };
 use super::*;
 use crate::elastic::{ClothModel, ElasticExpansion, ElasticFabric};
@@ -42,10 +42,7 @@ impl Hammock {
     }
 
     fn targets(&self) -> FrameTargets<'_> {
-        FrameTargets {
-            pins: &self.pins,
-            obstacle: &[],
-        }
+        pinned(&self.pins)
     }
 }
 

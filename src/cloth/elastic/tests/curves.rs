@@ -1,7 +1,7 @@
-//! Whole sheets against closed forms and measured curves: tension, a hanging strip.
+//! Whole sheets against closed forms and measured curves of tension.
 
-use super::test_statics::Statics;
-use super::test_strips::{StripPattern, TestStrip, strip};
+use super::statics::Statics;
+use super::strips::{StripPattern, TestStrip, strip};
 use super::{
     BendLaw, ClothModel, ElasticExpansion, ElasticFabric, RestSheet, StretchLaw, Stretching,
 };
@@ -118,56 +118,4 @@ fn measured_fabrics_pull_with_their_measured_force() {
             }
         }
     }
-}
-
-/// A limp strip between two points hangs as a catenary: its sag, and its tension at the lowest point.
-#[test]
-fn limp_strip_hangs_as_a_catenary() {
-    let s = strip(0.3, 33, 2, StripPattern::Unstructured(7));
-    let model = model(
-        &s,
-        fabric(StretchLaw::Linear(Stretching::isotropic(2000.0, 0.0)), 1e-9),
-    );
-    let (first, last) = (s.at[0].x, s.at[s.at.len() - 1].x);
-    let length = last - first;
-    let span = length / 1.3;
-    // 2 a sinh(span / 2a) = length, a = tension at the lowest point over weight per length.
-    let (mut low, mut high) = (0.05 * span, 5.0 * span);
-    for _ in 0..60 {
-        let a: f64 = 0.5 * (low + high);
-        if 2.0 * a * (0.5 * span / a).sinh() > length {
-            low = a;
-        } else {
-            high = a;
-        }
-    }
-    let sag = low * ((0.5 * span / low).cosh() - 1.0);
-    let mut held = vec![[false; 3]; s.at.len()];
-    for i in (0..s.rows).chain(s.at.len() - s.rows..s.at.len()) {
-        held[i] = [true; 3];
-    }
-    let statics = Statics {
-        model: &model,
-        gravity: V3d::new(0.0, -9.81, 0.0),
-        held,
-        load: Vec::new(),
-    };
-    // Start on a parabola.
-    let start = |p: &nalgebra::Vector2<f64>| {
-        let t = (p.x - first) / length;
-        V3d::new(t * span, -4.0 * sag * t * (1.0 - t), p.y)
-    };
-    let mut x: Vec<V3d> = s.at.iter().map(start).collect();
-    statics.solve(&mut x);
-    let deepest = -x.iter().map(|p| p.y).fold(0.0, f64::min);
-    assert!((deepest / sag - 1.0).abs() < 5e-3, "{deepest} {sag}");
-    let mut e = ElasticExpansion::default();
-    model.expand(Par::Seq, &x, &mut e);
-    let tension: f64 = -e.gradient[..s.rows].iter().map(|g| g.x).sum::<f64>();
-    let width = s.at[s.rows - 1].y - s.at[0].y;
-    let expected = low * 0.2 * 9.81 * width;
-    assert!(
-        (tension.abs() / expected - 1.0).abs() < 5e-3,
-        "{tension} {expected}"
-    );
 }

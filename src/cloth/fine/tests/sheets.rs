@@ -1,6 +1,6 @@
 //! Sheets, obstacles and an exhaustive intersection count for tests of the whole solver.
 
-use super::{ElasticTerm, MotionState, NewtonSettings, OfflineCloth, OfflineSolver, OfflineState};
+use super::*;
 use crate::contact::edge_meets_triangle;
 use crate::elastic::{BendLaw, ClothModel, ElasticFabric, RestSheet, StretchLaw, Stretching};
 use nalgebra::Vector2;
@@ -107,6 +107,14 @@ pub(super) fn resting(x: &[V3d], obstacle: &[V3d]) -> OfflineState {
         },
         obstacle: [obstacle.to_vec(), obstacle.to_vec()],
         ..OfflineState::default()
+    }
+}
+
+/// Targets of pins alone.
+pub(super) fn pinned(pins: &[PinTarget]) -> FrameTargets<'_> {
+    FrameTargets {
+        pins,
+        ..FrameTargets::default()
     }
 }
 

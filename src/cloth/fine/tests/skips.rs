@@ -1,7 +1,7 @@
 //! Skips of the solver: queries by a margin, steps by an error estimate, regions that sleep. Each can be switched off, and is
 //! bounded.
 
-use super::test_sheets::{PlanarSheet, assert_free, converged, isotropic, octahedron, resting};
+use super::sheets::{PlanarSheet, assert_free, converged, isotropic, octahedron, pinned, resting};
 use super::*;
 use std::ops::ControlFlow;
 use tryon_geometry::math::V3d;
@@ -72,10 +72,7 @@ fn swing(change: impl Fn(&mut OfflineSettings)) -> (Vec<V3d>, usize) {
         vertex: v,
         target: x[v as usize],
     });
-    let targets = FrameTargets {
-        pins: &pins,
-        obstacle: &[],
-    };
+    let targets = pinned(&pins);
     let mut steps = 0;
     for _ in 0..15 {
         steps += solver.advance(1.0 / 60.0, &targets).expect("a frame").steps;
@@ -124,10 +121,7 @@ fn wave(solver: &mut OfflineSolver<'_>, frames: std::ops::Range<u32>) -> usize {
             target: x[*v] + V3d::new(-height, height, 0.0),
         };
         let pins: Vec<_> = ends.iter().map(pin).collect();
-        let targets = FrameTargets {
-            pins: &pins,
-            obstacle: &[],
-        };
+        let targets = pinned(&pins);
         slept += solver
             .advance(1.0 / 60.0, &targets)
             .expect("a frame")

@@ -1,0 +1,9 @@
+//! Tests of whole sheets: closed forms, measured fabrics.
+
+use super::*;
+
+mod cantilever;
+mod curves;
+mod picture_frame;
+mod statics;
+pub(super) mod strips;
