@@ -151,7 +151,7 @@ impl FollowedBody {
         let Some(model) = &self.model else {
             return posed;
         };
-        let updated = self.body.update_vertices(model, posed, dt, &mut self.work);
+        let updated = self.body.update(model, posed, dt, &mut self.work);
         updated.map_or(posed, |_| self.body.vertices())
     }
 }

@@ -110,15 +110,6 @@ pub struct CollisionWorkspace {
     bvh: Option<Bvh>,
 }
 
-/// Work of an update.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub struct CollisionReport {
-    /// Vertices separated from another part.
-    pub separated: usize,
-    /// Vertices inside another part, which support no cloth.
-    pub interior: usize,
-}
-
 /// State of a collision body: the result of its last update, and what the next one starts from.
 ///
 /// Built once a pose and shared by whoever meets or draws the body. Any fixed frame of reference.
@@ -152,30 +143,12 @@ impl CollisionBody {
         &self.interior
     }
 
-    /// Follows the posed body (metres, shape `[vertices]`) through `dt` seconds: filters, separates, and updates normals
-    /// and interior. The first update takes the posed body unfiltered.
+    /// Follows the posed body (metres, shape `[vertices]`) through `dt` seconds: filters and separates, without normals. The
+    /// first update takes the posed body unfiltered. Returns the vertices separated from another part.
     ///
     /// # Errors
     /// A body that does not fit the model; the state is untouched then.
     pub fn update(
-        &mut self,
-        model: &CollisionModel,
-        posed: &[P3],
-        dt: f64,
-        work: &mut CollisionWorkspace,
-    ) -> Result<CollisionReport, CollisionError> {
-        let separated = self.update_vertices(model, posed, dt, work)?;
-        Ok(CollisionReport {
-            separated,
-            interior: self.refresh(model, work),
-        })
-    }
-
-    /// [`Self::update`] without normals and interior, for a renderer. Returns the vertices separated.
-    ///
-    /// # Errors
-    /// As [`Self::update`].
-    pub fn update_vertices(
         &mut self,
         model: &CollisionModel,
         posed: &[P3],
@@ -196,15 +169,14 @@ impl CollisionBody {
         model: &CollisionModel,
         posed: &[P3],
         work: &mut CollisionWorkspace,
-    ) -> Result<CollisionReport, CollisionError> {
+    ) -> Result<(), CollisionError> {
         model.check(posed)?;
         self.frame.vertices.clear();
         self.frame.vertices.extend_from_slice(posed);
         self.filtered.clear();
-        Ok(CollisionReport {
-            separated: self.apply_clearances(model),
-            interior: self.refresh(model, work),
-        })
+        self.apply_clearances(model);
+        self.refresh(model, work);
+        Ok(())
     }
 
     /// It has not followed a posed body yet.
@@ -327,14 +299,12 @@ mod tests {
         let r = body
             .update(&model, &start, 0.03, &mut work)
             .expect("it fits");
-        assert_eq!(
-            (r, body.vertices()),
-            (CollisionReport::default(), &start[..])
-        );
+        let interior = body.refresh(&model, &mut work);
+        assert_eq!((r, interior, body.vertices()), (0, 0, &start[..]));
         let r = body
             .update(&model, &at(&start, n, 0.19), 0.03, &mut work)
             .expect("it fits");
-        assert!(r.separated > 0 && r.interior == 0, "{r:?}");
+        assert!(r > 0 && body.refresh(&model, &mut work) == 0, "{r}");
         let gap = body.vertices()[n + 1].x - body.vertices()[0].x;
         assert!((gap - 0.013).abs() < 1e-3, "{gap} m between the poles");
         assert_eq!(body.frame().normals.len(), start.len());

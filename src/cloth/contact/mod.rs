@@ -29,8 +29,7 @@ pub use crate::settings::{
 };
 pub use closest_point::{ClosestPoint, SearchExtent};
 pub use collision_body::{
-    CollisionBody, CollisionError, CollisionModel, CollisionParts, CollisionReport,
-    CollisionWorkspace,
+    CollisionBody, CollisionError, CollisionModel, CollisionParts, CollisionWorkspace,
 };
 pub use contact_mesh::{ContactMesh, ContactMeshError, ContactSurface};
 pub use depth_maps::{DepthMaps, MapDetail, MapView};
