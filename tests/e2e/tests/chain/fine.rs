@@ -177,6 +177,8 @@ fn a_session_is_draped_fine_for_its_owner_alone() {
         fine_is_near_the_preview(&mut mine, &mut preview).await;
         a_fine_picture_is_drawn(&guarded, &mut compositor, &mut preview).await;
         strangers_are_refused(&guarded, &mut mine, &mut preview).await;
+        motion_is_recorded(&mut mine, &mut preview).await;
+        a_cancelled_motion_continues(&guarded, &mut mine, &mut preview).await;
 
         let endless = start(&mut mine, &mut preview, &drape(MINE, 50_000)).await;
         let endless = endless.simulation_id;
@@ -351,6 +353,126 @@ async fn a_fine_picture_is_drawn(guarded: &Guarded, mine: &mut Compositor, previ
     panic!("always aborted");
 }
 
+/// Exposures of the frames of a simulation and the number of frames that its last message says.
+async fn exposures(
+    c: &mut Cloth,
+    started: &StartSimulationResponse,
+) -> Result<(Vec<FrameId>, usize), Status> {
+    let followed = c.follow_simulation(follow(&started.simulation_id)).await?;
+    let mut followed = followed.into_inner();
+    let (mut exposures, mut count) = (Vec::new(), 0);
+    while let Some(m) = followed.message().await? {
+        if !m.positions.is_empty() {
+            assert_eq!(m.frame, started.first_frame + exposures.len() as u32);
+            assert_eq!(m.positions.len(), 12 * started.vertex_count as usize);
+            exposures.push(m.exposure.expect("an exposure"));
+        }
+        count = m.frame_count as usize;
+    }
+    Ok((exposures, count))
+}
+
+/// Each exposure of half a second is a frame, in order.
+async fn motion_is_recorded(mine: &mut Cloth, preview: &mut Preview) {
+    const SECONDS: f32 = 0.5;
+    for _ in 0..TRIES {
+        let started = start(mine, preview, &motion(SECONDS)).await;
+        assert_eq!(started.frame_count, 0, "not known yet");
+        let (exposures, count) = match exposures(mine, &started).await {
+            Ok(done) => done,
+            Err(s) if s.code() == Code::NotFound => continue,
+            Err(s) => panic!("{s}"),
+        };
+        let first = started.exposure.expect("an exposure");
+        assert_eq!(exposures[0], first);
+        let is_later = |w: &[FrameId]| w[0].capture_time_ns < w[1].capture_time_ns;
+        assert!(exposures.windows(2).all(is_later), "{exposures:?}");
+        let last = exposures[exposures.len() - 1].capture_time_ns;
+        let length = (last - first.capture_time_ns) as f32 * 1e-9;
+        println!("{count} frames in {length:.2} s of motion");
+        assert!(exposures.len() > 1 && length <= SECONDS, "{length} s");
+        assert_eq!(count, exposures.len());
+        return;
+    }
+    panic!("always forgotten");
+}
+
+/// A motion that is cancelled during its drape and after its first frames goes on for its owner, numbered on.
+async fn a_cancelled_motion_continues(guarded: &Guarded, mine: &mut Cloth, preview: &mut Preview) {
+    for _ in 0..TRIES {
+        match continued(guarded, mine, preview).await {
+            Ok(()) => return,
+            Err(s) if s.code() == Code::NotFound => {}
+            Err(s) => panic!("{s}"),
+        }
+    }
+    panic!("always forgotten");
+}
+
+/// NOT_FOUND when the body was forgotten.
+async fn continued(
+    guarded: &Guarded,
+    mine: &mut Cloth,
+    preview: &mut Preview,
+) -> Result<(), Status> {
+    const SECONDS: f32 = 0.5;
+    let started = start(mine, preview, &motion(SECONDS)).await;
+    let id = started.simulation_id;
+    cannot_be_continued(mine, &id).await?;
+    let cancelled = mine.cancel_simulation(cancel(&id)).await?.into_inner();
+    assert_eq!(cancelled, CancelSimulationResponse::default());
+
+    let mut theirs = cloth(guarded, Some("theirs"));
+    let stranger = theirs.start_simulation(continuation(&id)).await;
+    let followed = theirs.follow_simulation(follow(&id)).await;
+    assert_eq!(
+        told(&stranger.expect_err("start")),
+        told(&followed.expect_err("follow"))
+    );
+    let anew = mine.start_simulation(continuation(&id)).await?.into_inner();
+    assert_eq!(anew.first_frame, 0);
+    let mut frames = mine.follow_simulation(follow(&anew.simulation_id)).await?;
+    let mut published = 0;
+    while published < 2 {
+        let message = frames.get_mut().message().await?.expect("a frame");
+        published += u32::from(!message.positions.is_empty());
+    }
+    let cancelled = mine.cancel_simulation(cancel(&anew.simulation_id)).await?;
+    let cancelled = cancelled.into_inner();
+    assert!(cancelled.next_frame >= 2 && cancelled.checkpoint.is_empty());
+
+    let rest = mine.start_simulation(continuation(&anew.simulation_id));
+    let rest = rest.await?.into_inner();
+    let same = StartSimulationResponse {
+        first_frame: cancelled.next_frame,
+        frame_count: rest.frame_count,
+        simulation_id: rest.simulation_id.clone(),
+        ..started
+    };
+    assert!(rest == same, "other garments or another start");
+    let (before, _) = exposures(mine, &anew).await?;
+    let (after, count) = exposures(mine, &rest).await?;
+    assert_eq!(before.len() + after.len(), count);
+    let all: Vec<u64> = (before.iter().chain(&after))
+        .map(|e| e.capture_time_ns)
+        .collect();
+    assert!(all.is_sorted_by(|a, b| a < b), "{all:?}");
+    println!("{} frames and {} after them", before.len(), after.len());
+    cannot_be_continued(mine, &anew.simulation_id).await?;
+    cannot_be_continued(mine, &rest.simulation_id).await
+}
+
+/// An error that is not the expected refusal is returned.
+async fn cannot_be_continued(c: &mut Cloth, id: &str) -> Result<(), Status> {
+    let refused = c.start_simulation(continuation(id)).await;
+    let refused = refused.expect_err("no frames are left");
+    if refused.code() == Code::FailedPrecondition {
+        Ok(())
+    } else {
+        Err(refused)
+    }
+}
+
 /// Another session's token is refused as for the garments; the own one cancels, and no frame is left then.
 async fn strangers_are_refused(guarded: &Guarded, mine: &mut Cloth, preview: &mut Preview) {
     let mut theirs = cloth(guarded, Some("theirs"));
@@ -362,10 +484,8 @@ async fn strangers_are_refused(guarded: &Guarded, mine: &mut Cloth, preview: &mu
     let another = theirs.start_simulation(drape(MINE, VERTICES)).await;
     let followed = theirs.follow_simulation(follow(&id)).await;
     let cancelled = theirs.cancel_simulation(cancel(&id)).await;
-    let continued = theirs.start_simulation(continuation(&id)).await;
     for refused in [
         another.expect_err("start"),
-        continued.expect_err("continue"),
         followed.expect_err("follow"),
         cancelled.expect_err("cancel"),
     ] {
