@@ -3,12 +3,12 @@
 use super::{WireError, bulk, geometry, required};
 use crate::v1;
 use nalgebra::{Point3, Vector3};
-use tryon::body::{
+use tryon_body::{
     BodyShape, Joint, JointMotion, Pose, ShapeSpace, Skeleton, SkinWeights, Template,
 };
-use tryon::geometry::math::{Camera, P3, V3};
-use tryon::geometry::mesh::TriMesh;
-use tryon::tracking::KnownBody;
+use tryon_geometry::math::{Camera, P3, V3};
+use tryon_geometry::mesh::TriMesh;
+use tryon_tracking::KnownBody;
 
 const MAX_VERTICES: u32 = 65_536;
 const MAX_FACES: u32 = 131_072;
@@ -343,7 +343,7 @@ mod tests {
         assert_eq!(back.shape_space(), t.shape_space());
         let pose = Pose {
             angles: vec![0.1, 0.2, 0.3, 0.4],
-            root: tryon::geometry::math::Rigid::identity(),
+            root: tryon_geometry::math::Rigid::identity(),
         };
         assert_eq!(pose_from_wire(&pose_to_wire(&pose), 4).expect("same"), pose);
         let shape = BodyShape {
@@ -450,7 +450,7 @@ mod tests {
             "body_template.shape_directions[0].joints"
         );
         let pose = v1::BodyPose {
-            camera_from_body: Some(geometry::rigid_to_wire(&tryon::geometry::math::Rigid::<
+            camera_from_body: Some(geometry::rigid_to_wire(&tryon_geometry::math::Rigid::<
                 Camera,
                 Camera,
             >::identity())),

@@ -2,8 +2,8 @@
 
 use super::WireError;
 use bytes::Bytes;
-use tryon::formats::image;
-use tryon::geometry::camera::{ColorImage, DepthImage, Intrinsics};
+use tryon_formats::image;
+use tryon_geometry::camera::{ColorImage, DepthImage, Intrinsics};
 
 /// JPEG quality of frames on the bus: 35 kB at 640×480 without visible blocks; 60 kB at 90.
 const BUS_JPEG_QUALITY: u8 = 80;

@@ -1,7 +1,7 @@
 //! Fit maps on the wire.
 
 use crate::v1::{FitClass, GarmentFit, RegionFit};
-use tryon::dressing::{self, FitMap, FitMapSettings, Suggestion};
+use tryon_dressing::{FitMap, FitMapSettings, Suggestion};
 
 /// Byte of a tightness.
 const TIGHTEST: f32 = 127.0;
@@ -23,9 +23,9 @@ pub fn fit_to_wire(
     let regions = map.regions.iter().map(|r| RegionFit {
         region: r.name.clone(),
         fit: match r.fit {
-            dressing::FitClass::Tight => FitClass::Tight,
-            dressing::FitClass::Fitted => FitClass::Fitted,
-            dressing::FitClass::Loose => FitClass::Loose,
+            tryon_dressing::FitClass::Tight => FitClass::Tight,
+            tryon_dressing::FitClass::Fitted => FitClass::Fitted,
+            tryon_dressing::FitClass::Loose => FitClass::Loose,
         }
         .into(),
         stretch: r.stretch[1] as f32,
@@ -55,9 +55,9 @@ pub fn fit_to_wire(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use tryon::body::measure::Measurements;
-    use tryon::dressing::{FinishedGarment, RegionFit as Region, assess};
-    use tryon::garment::{Size, library};
+    use tryon_body::measure::Measurements;
+    use tryon_dressing::{FinishedGarment, RegionFit as Region, assess};
+    use tryon_garment::{Size, library};
 
     #[test]
     fn ease_is_reported_with_its_region() {
@@ -68,7 +68,7 @@ mod tests {
             pressure: [0.0; 2],
             touching: 0.0,
             gap: 0.01,
-            fit: dressing::FitClass::Fitted,
+            fit: tryon_dressing::FitClass::Fitted,
         };
         let map = FitMap {
             vertices: Vec::new(),

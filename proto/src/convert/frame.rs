@@ -5,7 +5,7 @@ use crate::v1;
 use bytes::Bytes;
 use std::sync::Arc;
 use std::time::Instant;
-use tryon::geometry::camera::{Calibration, RgbdFrame};
+use tryon_geometry::camera::{Calibration, RgbdFrame};
 
 /// One exposure with its calibration and stage times.
 #[derive(Clone, Debug)]
@@ -109,7 +109,7 @@ pub fn exposure_from_wire(m: &v1::RgbdFrame) -> Result<Exposure, WireError> {
 mod tests {
     use super::*;
     use prost::Message;
-    use tryon::geometry::camera::{ColorImage, DepthImage, Intrinsics};
+    use tryon_geometry::camera::{ColorImage, DepthImage, Intrinsics};
 
     fn exposure() -> Exposure {
         let k = Intrinsics::KINECT_V1.resized(64, 48);

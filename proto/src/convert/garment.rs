@@ -4,11 +4,11 @@ use super::{WireError, bulk, required};
 use crate::v1;
 use std::path::Path;
 use std::sync::Arc;
-use tryon::formats::image::{decode_color, encode_jpeg, encode_png_rgb};
-use tryon::formats::{FormatError, PositionCoder};
-use tryon::garment::FabricImage;
-use tryon::geometry::math::P3;
-use tryon::geometry::mesh::Face;
+use tryon_formats::image::{decode_color, encode_jpeg, encode_png_rgb};
+use tryon_formats::{FormatError, PositionCoder};
+use tryon_garment::FabricImage;
+use tryon_geometry::math::P3;
+use tryon_geometry::mesh::Face;
 
 const MAX_VERTICES: u32 = 262_144;
 const MAX_FACES: u32 = 524_288;
@@ -287,7 +287,7 @@ impl GarmentReader {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use tryon::geometry::camera::ColorImage;
+    use tryon_geometry::camera::ColorImage;
 
     /// Two triangles of two panels that share a seam: four simulated vertices, six drawn ones.
     fn flag() -> WornGarment {

@@ -3,8 +3,8 @@
 use super::{WireError, required};
 use crate::v1;
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
-use tryon::geometry::camera::{Calibration, Intrinsics};
-use tryon::geometry::math::Rigid;
+use tryon_geometry::camera::{Calibration, Intrinsics};
+use tryon_geometry::math::Rigid;
 
 /// Largest error of a quaternion's norm: f32 senders are off by 1e-7, wrong scales by far more.
 const QUATERNION_NORM_TOLERANCE: f64 = 1e-3;
@@ -137,7 +137,7 @@ pub fn calibration_to_wire(c: &Calibration) -> v1::Calibration {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use tryon::geometry::math::{Camera, World};
+    use tryon_geometry::math::{Camera, World};
 
     #[test]
     fn calibrations_round_trip_and_nan_is_named() {

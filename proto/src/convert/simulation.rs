@@ -4,7 +4,7 @@ use super::garment::{MAX_GARMENTS, PlacedGarments, WornGarment, topology_from_wi
 use super::{WireError, bulk};
 use crate::v1;
 use std::sync::Arc;
-use tryon::geometry::math::P3;
+use tryon_geometry::math::P3;
 
 const POSITIONS: &str = "follow_simulation_response.positions";
 

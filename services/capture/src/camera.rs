@@ -9,7 +9,7 @@ use std::sync::Arc;
 use tokio::sync::{mpsc, oneshot, watch};
 use tokio_util::sync::CancellationToken;
 use tonic::Status;
-use tryon::geometry::camera::Calibration;
+use tryon_geometry::camera::Calibration;
 use tryon_kit::compute::Pool;
 use tryon_kit::config::CameraConfig;
 use tryon_kit::frames::CameraKey;

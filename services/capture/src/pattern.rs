@@ -1,7 +1,7 @@
 //! A test picture: a wall three metres away and colours that move, so that a chain can be checked without anybody.
 
-use tryon::formats::{FormatError, RgbdSource};
-use tryon::geometry::camera::{Calibration, ColorImage, DepthImage, Intrinsics, RgbdFrame};
+use tryon_formats::{FormatError, RgbdSource};
+use tryon_geometry::camera::{Calibration, ColorImage, DepthImage, Intrinsics, RgbdFrame};
 
 /// Distance of the wall, millimetres.
 const WALL_MM: u16 = 3000;

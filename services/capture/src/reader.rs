@@ -7,7 +7,7 @@ use crate::source::OpenSource;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 use tokio::sync::watch;
-use tryon::geometry::camera::{Calibration, RgbdFrame};
+use tryon_geometry::camera::{Calibration, RgbdFrame};
 use tryon_kit::compute::Pool;
 use tryon_kit::config::CameraConfig;
 use tryon_kit::flow::Flow;

@@ -5,8 +5,8 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::mpsc::{Receiver, SyncSender, TrySendError, sync_channel};
 use std::sync::{Arc, Mutex, PoisonError};
 use tonic::Status;
-use tryon::formats::{FormatError, McapWriter};
-use tryon::geometry::camera::Calibration;
+use tryon_formats::{FormatError, McapWriter};
+use tryon_geometry::camera::Calibration;
 use tryon_kit::frames::Exposure;
 
 /// Frames that wait for the disk: half a second at 30 a second, 20 MB of shared images.

@@ -2,8 +2,8 @@
 
 use crate::pattern::Pattern;
 use std::path::Path;
-use tryon::formats::{RgbdSource, open_recording};
-use tryon::synth::{Actor, Posture, Routine, Sequence, Setting, SynthSource};
+use tryon_formats::{RgbdSource, open_recording};
+use tryon_synth::{Actor, Posture, Routine, Sequence, Setting, SynthSource};
 
 /// A source ready to be read.
 pub type OpenSource = Box<dyn RgbdSource>;

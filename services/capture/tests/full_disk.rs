@@ -4,7 +4,7 @@ use std::io::{BufRead, BufReader};
 use std::process::{Child, Command, Stdio};
 use std::time::Duration;
 use tonic::Code;
-use tryon::formats::open_recording;
+use tryon_formats::open_recording;
 use tryon_proto::v1::capture_service_client::CaptureServiceClient;
 use tryon_proto::v1::{
     CameraInfo, HoldConsentRequest, ListCamerasRequest, StartRecordingRequest, StopRecordingRequest,

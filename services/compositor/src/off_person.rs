@@ -37,7 +37,7 @@ fn record(off: &OffPerson) {
 
 /// Sets the measurement of a live picture, and the reason while a part hangs off.
 pub(crate) fn describe(picture: &mut Picture, off: Option<&OffPerson>) {
-    picture.off_person = off.map(off_person_to_wire);
+    picture.off_person = off.map(|off| off_person_to_wire(off.share, off.parts));
     if off.is_some_and(|o| o.hanging_parts().next().is_some()) {
         picture.set_reason(DegradedReason::GarmentOffPerson);
     }

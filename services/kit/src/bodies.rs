@@ -12,7 +12,7 @@ use std::sync::Arc;
 use std::time::Duration;
 use tokio_stream::StreamExt;
 use tonic::Code;
-use tryon::body::{BodyShape, Template};
+use tryon_body::{BodyShape, Template};
 use tryon_proto::Message;
 use tryon_proto::convert::{body, required};
 use tryon_proto::v1::tracking_service_client::TrackingServiceClient;

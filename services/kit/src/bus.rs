@@ -25,7 +25,7 @@ use std::path::Path;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 use tokio::sync::watch;
-use tryon::geometry::camera::Calibration;
+use tryon_geometry::camera::Calibration;
 use tryon_proto::v1::FrameKey;
 use zenoh::Wait;
 use zenoh::bytes::ZBytes;

@@ -3,7 +3,7 @@
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::{Arc, Mutex, PoisonError, mpsc};
 use tokio::sync::oneshot;
-use tryon::geometry::par::{PoolError, with_threads};
+use tryon_geometry::par::{PoolError, with_threads};
 
 type Job = Box<dyn FnOnce() + Send>;
 
@@ -83,7 +83,7 @@ impl Pool {
 
     fn start(threads: usize, name: &str, niceness: i32) -> std::io::Result<Arc<Self>> {
         // Here, lest a background thread be the first to need them: they would take over its priority.
-        tryon::geometry::par::start();
+        tryon_geometry::par::start();
         let (tx, rx) = mpsc::channel::<Job>();
         let rx = Arc::new(Mutex::new(rx));
         for i in 0..threads {

@@ -12,7 +12,7 @@ use std::pin::Pin;
 use std::sync::{Arc, Mutex, PoisonError};
 use tokio::sync::watch;
 use tokio::time::Instant;
-use tryon::geometry::camera::Calibration;
+use tryon_geometry::camera::Calibration;
 use tryon_proto::Message;
 pub use tryon_proto::convert::frame::{Exposure, exposure_from_wire, exposure_to_wire, stage};
 pub use tryon_proto::keys::CameraKey;
@@ -247,7 +247,7 @@ impl FrameBus for LocalBus {
 pub(crate) mod tests {
     use super::*;
     use std::time::Duration;
-    use tryon::geometry::camera::{ColorImage, DepthImage, Intrinsics, RgbdFrame};
+    use tryon_geometry::camera::{ColorImage, DepthImage, Intrinsics, RgbdFrame};
     use tryon_proto::v1::FrameId;
 
     pub(crate) fn exposure(sequence: u64) -> Arc<Exposure> {

@@ -5,10 +5,10 @@ use crate::consent::REMEMBER_FOR;
 use std::sync::Arc;
 use tokio::sync::watch;
 use tokio::time::Instant;
-use tryon::body::{BodyShape, Template};
-use tryon::tracking::KnownBody;
+use tryon_body::{BodyShape, Template};
 use tryon_proto::convert::body::known_body_to_wire;
 use tryon_proto::v1::{self, BodyState, TrackingStatus};
+use tryon_tracking::KnownBody;
 
 /// Weight of a new residual in the mean of the remembered one.
 const NEWEST: f64 = 0.1;
@@ -100,7 +100,7 @@ impl RememberedBody {
 mod tests {
     use super::*;
     use std::time::Duration;
-    use tryon::body::embedded;
+    use tryon_body::embedded;
 
     fn state(subject: u64, status: TrackingStatus) -> BodyState {
         BodyState {

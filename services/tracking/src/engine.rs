@@ -3,17 +3,17 @@
 use std::path::Path;
 use std::sync::{Arc, OnceLock};
 use std::time::Instant;
-use tryon::body::{BodyShape, Template, embedded, import};
-use tryon::formats::npz;
-use tryon::geometry::camera::{Calibration, Intrinsics};
-use tryon::tracking::{
-    KnownBody, LostReason, Status, TrackerConfig, TrackerModel, TrackerState, Workspace,
-    adapt_surface, follow,
-};
+use tryon_body::{BodyShape, Template, embedded, import};
+use tryon_formats::npz;
+use tryon_geometry::camera::{Calibration, Intrinsics};
 use tryon_kit::frames::{Exposure, stage};
 use tryon_kit::telemetry::record_skipped;
 use tryon_proto::convert::{body, geometry};
 use tryon_proto::v1::{self, DegradedReason, TrackingStatus};
+use tryon_tracking::{
+    KnownBody, LostReason, Status, TrackerConfig, TrackerModel, TrackerState, Workspace,
+    adapt_surface, follow,
+};
 
 /// Configured template: an SMPL-layout npz, or the embedded body for an empty path.
 pub(crate) fn load_template(path: &Path) -> Result<Arc<Template>, String> {

@@ -8,7 +8,7 @@ mod service;
 mod session;
 
 use std::sync::Arc;
-use tryon::body::Template;
+use tryon_body::Template;
 use tryon_kit::config::Config;
 use tryon_kit::server::{self, Context, Running, Service, StartError};
 use tryon_proto::v1::tracking_service_server::{SERVICE_NAME, TrackingServiceServer};

@@ -9,8 +9,7 @@ use std::time::Duration;
 use tokio_stream::StreamExt;
 use tokio_stream::wrappers::WatchStream;
 use tonic::{Code, Request, Response, Status};
-use tryon::body::Template;
-use tryon::tracking::KnownBody;
+use tryon_body::Template;
 use tryon_kit::auth::Grant;
 use tryon_kit::config::TrackingConfig;
 use tryon_kit::server::Context;
@@ -19,6 +18,7 @@ use tryon_kit::status::{exhausted, not_found, unavailable};
 use tryon_proto::convert::{body, request};
 use tryon_proto::v1::tracking_service_server::TrackingService;
 use tryon_proto::v1::*;
+use tryon_tracking::KnownBody;
 
 /// Directory of sessions and the dependencies of new ones.
 pub(crate) struct Tracking {

@@ -6,7 +6,6 @@ use std::time::Duration;
 use tokio::sync::{mpsc, watch};
 use tokio::time::Instant;
 use tokio_util::sync::CancellationToken;
-use tryon::tracking::KnownBody;
 use tryon_kit::compute::ComputeError;
 use tryon_kit::consent::{FORGET_AFTER, REMEMBER_FOR};
 use tryon_kit::flow::Flow;
@@ -16,6 +15,7 @@ use tryon_kit::session_task::{self, Place};
 use tryon_kit::sessions::{Sessions, brief};
 use tryon_kit::telemetry::record_stages;
 use tryon_proto::v1::{self, DegradedReason, TrackingStatus};
+use tryon_tracking::KnownBody;
 
 /// Time without a frame after which the camera counts as silent: half of the time in which clients must know.
 const SILENCE: Duration = Duration::from_millis(500);

@@ -50,11 +50,8 @@ pub(crate) enum PullPlace {
 /// Pull of one place to a target. At weight 0 its vertices are solved with those that are pulled.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Pull {
-    /// Place.
     pub(crate) at: PullPlace,
-    /// Weight of the squared distance.
     pub(crate) weight: f64,
-    /// Target, metres.
     pub(crate) target: P3,
 }
 
@@ -250,7 +247,6 @@ impl QuadraticEnergy {
 #[derive(Debug, Default)]
 struct RestrictedSystem {
     diagonal: Vec<f64>,
-    /// Preconditioner.
     inverse: Vec<Matrix3<f64>>,
     /// Column and value beside the diagonal, row after row.
     entries: Vec<(u32, f64)>,

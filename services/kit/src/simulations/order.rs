@@ -1,6 +1,6 @@
 //! Order of the frames of a simulation: each arrives once, after the one before it.
 
-use tryon::geometry::math::P3;
+use tryon_geometry::math::P3;
 use tryon_proto::convert::simulation::positions_from_wire;
 use tryon_proto::convert::{WireError, required};
 use tryon_proto::v1::{FollowSimulationResponse, FrameId};

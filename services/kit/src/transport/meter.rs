@@ -13,7 +13,7 @@ use std::sync::Arc;
 use std::task::{Context, Poll, ready};
 use std::time::Instant;
 use tokio::io::{AsyncRead, AsyncWrite, ReadBuf};
-use tryon::geometry::settings;
+use tryon_geometry::settings;
 
 /// Reads and frames for which nothing was paid. One costs 5 to 10 µs, so that 512 connections at this rate take a tenth
 /// of a core. A client without calls pings each 10 s.
