@@ -11,7 +11,6 @@ use tryon_geometry::linear::{
 };
 use tryon_geometry::math::P3;
 use tryon_geometry::mesh::{Csr, Face};
-use tryon_geometry::par::Par;
 
 /// Weight of an edge of an even mesh in the Dirichlet energy of a displacement: the cotangent of 60°.
 pub(crate) const EVEN_EDGE: f64 = 0.577;

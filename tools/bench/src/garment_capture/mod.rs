@@ -23,7 +23,7 @@ use tryon_clothcap::align::find_frame;
 use tryon_clothcap::archive::FrameDisplacements;
 use tryon_clothcap::scan::BodyScan;
 use tryon_clothcap::{
-    BodyDresser, CaptureConfig, CaptureError, CapturedOutfit, FrameCapture, OutfitCapture,
+    BodyDresser, CaptureError, CapturedOutfit, FrameCapture, OutfitCapture, OutfitCaptureConfig,
     population,
 };
 use tryon_formats::scan::ScanMesh;
@@ -107,7 +107,7 @@ fn run(
     scans: &[TrueScan],
     bodies: usize,
 ) -> Result<SceneRun, CaptureError> {
-    let mut capture = OutfitCapture::new(template.clone(), CaptureConfig::default())?;
+    let mut capture = OutfitCapture::new(template.clone(), OutfitCaptureConfig::default())?;
     let mut out = SceneRun::default();
     let share = 1.0 / scans.len().max(1) as f64;
     let mut first = None;
