@@ -4,8 +4,7 @@
 //! it the exact nearest point is walked to on the mesh itself, so the resolution of the maps decides how good the
 //! proposal is, never how deep cloth may sink.
 
-use crate::settings::MapSettings;
-use serde::{Deserialize, Serialize};
+use crate::settings::{MapDetail, MapSettings};
 use tryon_geometry::math::P3;
 use tryon_geometry::mesh::Face;
 use tryon_geometry::par::{self, Par};
@@ -22,19 +21,6 @@ pub struct MapView {
     pub border: f32,
     /// Largest side, pixels.
     pub largest: f32,
-}
-
-/// Resolution of the depth maps: 8 mm a pixel where fine, else 16.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum MapDetail {
-    /// The one that looks from the real camera (the paper's view-dependent resolution).
-    #[default]
-    InView,
-    /// All four.
-    Everywhere,
-    /// None.
-    Nowhere,
 }
 
 impl MapView {

@@ -25,14 +25,15 @@ mod test_shapes;
 mod triangle_fan;
 
 pub use crate::settings::{
-    CollisionConfig, JointClearanceSettings, MapSettings, PartClearanceSettings, SurfaceSettings,
+    CollisionConfig, JointClearanceSettings, MapDetail, MapSettings, PartClearanceSettings,
+    SkinQuerySettings,
 };
 pub use closest_point::{ClosestPoint, SearchExtent};
 pub use collision_body::{
     CollisionBody, CollisionError, CollisionModel, CollisionParts, CollisionWorkspace,
 };
 pub use contact_mesh::{ContactMesh, ContactMeshError, ContactSurface};
-pub use depth_maps::{DepthMaps, MapDetail, MapView};
+pub use depth_maps::{DepthMaps, MapView};
 pub use distance::{
     ClosestFeatures, ParallelMollifier, Separation, Slide, edge_edge, mollifier_threshold,
     point_edge, point_point, point_triangle,

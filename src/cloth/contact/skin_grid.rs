@@ -3,7 +3,7 @@
 //! In the crook of an elbow, or between toes, a walk ends on skin that is near but is not the skin below the cloth.
 
 use super::{ClosestPoint, Part, SurfaceFrame, SurfaceModel};
-use crate::settings::SurfaceSettings;
+use crate::settings::SkinQuerySettings;
 use tryon_geometry::math::P3;
 use tryon_geometry::spatial::HashGrid;
 
@@ -27,7 +27,7 @@ impl SkinGrid {
         x: &P3,
         masks: [Part; 2],
     ) -> [SkinCandidates; 2] {
-        let SurfaceSettings { nearest, below, .. } = surface.settings;
+        let SkinQuerySettings { nearest, below, .. } = surface.settings;
         let mut found = [[(nearest * nearest, None), (below * below, None)]; 2];
         self.grid.within(x, below, |v, d| {
             let part = surface.part(v);

@@ -1,6 +1,6 @@
 //! A triangle surface whose vertices move while its topology and parts stay.
 
-use crate::settings::SurfaceSettings;
+use crate::settings::SkinQuerySettings;
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, BTreeSet};
 use tryon_geometry::math::{P3, V3};
@@ -21,7 +21,7 @@ pub struct SurfaceModel {
     pub(super) border: Vec<bool>,
     /// Parts common to all corners of the faces around each vertex.
     pub(super) common: Vec<Part>,
-    pub(super) settings: SurfaceSettings,
+    pub(super) settings: SkinQuerySettings,
 }
 
 /// Vertices and normals of a surface at one time.
@@ -62,7 +62,7 @@ impl SurfaceModel {
             faces,
             topology,
             parts,
-            settings: SurfaceSettings::default(),
+            settings: SkinQuerySettings::default(),
         }
     }
     /// Number of vertices.

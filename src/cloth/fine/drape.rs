@@ -1,11 +1,11 @@
 //! Static drape: pseudo-transient continuation, implicit Euler steps from rest that grow as the cloth settles.
 
 use super::error::OfflineError;
-use super::integrator::TimeScheme;
 use super::newton::{NewtonReport, largest, mean};
 use super::step::OfflineSolver;
 use super::targets::{FrameScript, FrameTargets, StepTargets};
 use crate::settings::DrapeSettings;
+use crate::settings::TimeScheme;
 use serde::{Deserialize, Serialize};
 use std::ops::ControlFlow;
 use tryon_geometry::math::V3d;

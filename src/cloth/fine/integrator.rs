@@ -6,16 +6,6 @@
 use serde::{Deserialize, Serialize};
 use tryon_geometry::math::{P3, V3d};
 
-/// Order of a step.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Default, Serialize, Deserialize)]
-pub enum TimeScheme {
-    /// First order, dissipative.
-    ImplicitEuler,
-    /// Second order with a variable step.
-    #[default]
-    Bdf2,
-}
-
 /// Positions and velocities at one time.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct MotionState {

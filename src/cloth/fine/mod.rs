@@ -26,8 +26,8 @@ mod targets;
 mod tests;
 
 pub use crate::settings::{
-    ContactSettings, DrapeSettings, NewtonSettings, ObstacleSpring, OfflineSettings, SleepSettings,
-    StartSettings,
+    ContactSettings, DrapeSettings, NewtonSettings, ObstacleSpring, OfflineSettings,
+    OfflineStartSettings, SleepSettings, TimeScheme,
 };
 pub use animation::AnimationProgress;
 pub use checkpoint::{checkpoint_frame, checkpoint_state};
@@ -36,7 +36,7 @@ pub use drape::DrapeReport;
 pub use elastic_term::ElasticTerm;
 pub use energy_term::{ElementTerm, EnergyElements, EnergyTerm};
 pub use error::{NewtonFault, OfflineError};
-pub use integrator::{MotionState, OfflineState, TimeScheme};
+pub use integrator::{MotionState, OfflineState};
 pub use model::{OfflineCloth, PinTarget};
 pub use newton::NewtonReport;
 pub use start::{JoinedSurfaces, StartReport};

@@ -6,7 +6,7 @@
 use super::error::OfflineError;
 use crate::contact::ContactMesh;
 use crate::contact::broad_phase::{BroadPhase, EdgeFace};
-use crate::settings::StartSettings;
+use crate::settings::OfflineStartSettings;
 use serde::{Deserialize, Serialize};
 use tryon_geometry::math::V3d;
 use tryon_geometry::mesh::Face;
@@ -38,7 +38,7 @@ impl JoinedSurfaces<'_> {
     /// # Errors
     /// [`OfflineError::IntersectingStart`] naming all, when some stay or a vertex moved too far; `x` is then as it was.
     pub fn repair(&self, par: Par, x: &mut [V3d]) -> Result<StartReport, OfflineError> {
-        let settings = StartSettings::default();
+        let settings = OfflineStartSettings::default();
         let begin = x.to_vec();
         let first = self.crossings(par, x);
         let (passes, is_free) = self.relax_all(&settings, par, first.clone(), x);
@@ -62,7 +62,7 @@ impl JoinedSurfaces<'_> {
     /// free.
     fn relax_all(
         &self,
-        settings: &StartSettings,
+        settings: &OfflineStartSettings,
         par: Par,
         mut crossings: Vec<EdgeFace>,
         x: &mut [V3d],
@@ -84,7 +84,13 @@ impl JoinedSurfaces<'_> {
     }
 
     /// One pass around the crossings.
-    fn relax(&self, settings: &StartSettings, crossings: &[EdgeFace], rings: usize, x: &mut [V3d]) {
+    fn relax(
+        &self,
+        settings: &OfflineStartSettings,
+        crossings: &[EdgeFace],
+        rings: usize,
+        x: &mut [V3d],
+    ) {
         let (faces, edges) = (self.0.faces(), self.0.edges());
         let mut marked = vec![false; x.len()];
         for EdgeFace { edge, face } in crossings {
@@ -189,7 +195,7 @@ mod tests {
             other => panic!("{other:?}"),
         }
         assert_eq!(x, before);
-        let settings = StartSettings::default();
+        let settings = OfflineStartSettings::default();
         let (passes, is_free) = all.relax_all(&settings, Par::Seq, found, &mut x);
         // Wider rings alone bring 24 crossings to 19 in 60 passes.
         assert!(

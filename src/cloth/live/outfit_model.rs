@@ -134,6 +134,40 @@ impl Model {
     }
 }
 
+impl Config {
+    /// # Errors
+    /// Names the first setting out of range.
+    pub fn check(&self) -> Result<(), ClothError> {
+        let lengths = [self.noise_deadband, self.untangle];
+        let faults = [
+            (
+                self.most_steps == 0 || self.patch == 0,
+                "most_steps, patch",
+                "both must be at least 1",
+            ),
+            (
+                !(0.0..=1.0).contains(&self.force_lookahead),
+                "ahead",
+                "must be between 0 and 1 step",
+            ),
+            (
+                !(self.offset.is_finite()
+                    && self.teleport > 0.0
+                    && lengths.iter().all(|l| *l >= 0.0)),
+                "offset, teleport, steady, untangle",
+                "they must be finite, teleport positive, steady and untangle not negative",
+            ),
+            (
+                !(0.0..1.0).contains(&self.min_fold_ratio),
+                "sharpest",
+                "must be at least 0 and less than 1",
+            ),
+        ];
+        let fault = faults.into_iter().find(|f| f.0);
+        fault.map_or(Ok(()), |(_, field, why)| Err(ClothError::field(field, why)))
+    }
+}
+
 /// Checks that there are anchors for every garment, of vertices that exist; `body`: number of body vertices.
 fn check_anchors(body: usize, outfit: &Outfit) -> Result<(), ClothError> {
     if outfit.anchors.len() != outfit.garments.len() {

@@ -1,7 +1,21 @@
 //! Settings of the body as cloth meets it.
 
 use super::settings;
+use serde::{Deserialize, Serialize};
 use tryon_geometry::par::Par;
+
+/// Resolution of the depth maps: 8 mm a pixel where fine, else 16.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum MapDetail {
+    /// The one that looks from the real camera (the paper's view-dependent resolution).
+    #[default]
+    InView,
+    /// All four.
+    Everywhere,
+    /// None.
+    Nowhere,
+}
 
 settings! {
     /// Settings of a collision body.
@@ -28,7 +42,7 @@ settings! {
         /// Distance off the skin at which the winding number is taken, metres: less than a fabric's thickness, above rounding.
         pub off_skin: f32 = 1e-3,
         /// Queries of the skin.
-        pub surface: SurfaceSettings = SurfaceSettings::default(),
+        pub surface: SkinQuerySettings = SkinQuerySettings::default(),
     }
 
     /// Settings of the separation of body parts that press on each other.
@@ -55,7 +69,7 @@ settings! {
     }
 
     /// Settings of the queries of a surface.
-    pub struct SurfaceSettings {
+    pub struct SkinQuerySettings {
         /// Longest walk, edges (30 cm on a body of 13k vertices): a longer one began at a lost start.
         pub max_walk: usize = 40,
         /// Slack between the nearest vertex and the closest point of the faces around it, metres: an edge of the body.

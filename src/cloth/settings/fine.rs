@@ -1,7 +1,17 @@
 //! Settings of the offline solver.
 
 use super::settings;
-use crate::fine::TimeScheme;
+use serde::{Deserialize, Serialize};
+
+/// Order of a step.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub enum TimeScheme {
+    /// First order, dissipative.
+    ImplicitEuler,
+    /// Second order with a variable step.
+    #[default]
+    Bdf2,
+}
 
 settings! {
     /// Settings of the time integration.
@@ -114,7 +124,7 @@ settings! {
     }
 
     /// Repair of a start.
-    pub struct StartSettings {
+    pub struct OfflineStartSettings {
         /// Smoothing passes before a start is refused.
         pub passes: usize = 60,
         /// Passes after which one more ring of vertices takes part; as many without fewer crossings end the repair.

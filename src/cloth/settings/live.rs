@@ -1,10 +1,9 @@
 //! Settings of the real-time simulator.
 
 use super::{
-    CollisionConfig, MapSettings, RepairSettings, SolverSettings, StillnessSettings, settings,
+    ClothRepairSettings, CollisionConfig, MapDetail, MapSettings, SolverSettings,
+    StillnessSettings, settings,
 };
-use crate::contact::MapDetail;
-use crate::live::ClothError;
 use tryon_geometry::math::{Camera, Rigid, V3d, World};
 use tryon_geometry::par::Par;
 
@@ -61,7 +60,7 @@ settings! {
         /// Virtual depth maps.
         pub maps: MapSettings = MapSettings::default(),
         /// Division of time.
-        pub time: StepSettings = StepSettings::default(),
+        pub time: LiveStepSettings = LiveStepSettings::default(),
         /// Contact.
         pub contact: ClothContactSettings = ClothContactSettings::default(),
         /// Explicit solver.
@@ -69,11 +68,11 @@ settings! {
         /// Thresholds of sleep.
         pub stillness: StillnessSettings = StillnessSettings::default(),
         /// Repair.
-        pub repair: RepairSettings = RepairSettings::default(),
+        pub repair: ClothRepairSettings = ClothRepairSettings::default(),
     }
 
     /// Division of a step's time.
-    pub struct StepSettings {
+    pub struct LiveStepSettings {
         /// Range of time steps, s: shorter and longer ones are clamped.
         pub range: [f64; 2] = [1e-4, 0.1],
         /// Time between two contact queries, s: at 3 m/s a limb moves 25 mm, half the reach of a query.
@@ -174,36 +173,6 @@ impl Config {
             par: self.par,
             ..self.body
         }
-    }
-    /// Names the first setting out of range.
-    pub fn check(&self) -> Result<(), ClothError> {
-        let lengths = [self.noise_deadband, self.untangle];
-        let faults = [
-            (
-                self.most_steps == 0 || self.patch == 0,
-                "most_steps, patch",
-                "both must be at least 1",
-            ),
-            (
-                !(0.0..=1.0).contains(&self.force_lookahead),
-                "ahead",
-                "must be between 0 and 1 step",
-            ),
-            (
-                !(self.offset.is_finite()
-                    && self.teleport > 0.0
-                    && lengths.iter().all(|l| *l >= 0.0)),
-                "offset, teleport, steady, untangle",
-                "they must be finite, teleport positive, steady and untangle not negative",
-            ),
-            (
-                !(0.0..1.0).contains(&self.min_fold_ratio),
-                "sharpest",
-                "must be at least 0 and less than 1",
-            ),
-        ];
-        let fault = faults.into_iter().find(|f| f.0);
-        fault.map_or(Ok(()), |(_, field, why)| Err(ClothError::field(field, why)))
     }
 }
 

@@ -10,15 +10,16 @@ mod solver;
 mod stillness;
 
 pub use contact::{
-    CollisionConfig, JointClearanceSettings, MapSettings, PartClearanceSettings, SurfaceSettings,
+    CollisionConfig, JointClearanceSettings, MapDetail, MapSettings, PartClearanceSettings,
+    SkinQuerySettings,
 };
 pub use elastic::ElasticSettings;
 pub use fine::{
-    ContactSettings, DrapeSettings, NewtonSettings, ObstacleSpring, OfflineSettings, SleepSettings,
-    StartSettings,
+    ContactSettings, DrapeSettings, NewtonSettings, ObstacleSpring, OfflineSettings,
+    OfflineStartSettings, SleepSettings, TimeScheme,
 };
-pub use live::{ClothContactSettings, Config, SelfContactSettings, StepSettings};
-pub use repair::{RepairSettings, SleeveSettings, UntanglerSettings};
+pub use live::{ClothContactSettings, Config, LiveStepSettings, SelfContactSettings};
+pub use repair::{ClothRepairSettings, SleeveSettings, UntanglerSettings};
 pub use scene::SceneSettings;
 pub use solver::{FoldSettings, SolverSettings};
 pub use stillness::StillnessSettings;

@@ -4,7 +4,7 @@ use super::settings;
 
 settings! {
     /// Settings of the repair of worn garments.
-    pub struct RepairSettings {
+    pub struct ClothRepairSettings {
         /// Largest displacement of an untangling query, metres. With 5 mm armpits without clearance for two layers stretch by
         /// 18 %.
         pub max_displacement: f64 = 0.003,

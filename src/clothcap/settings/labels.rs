@@ -38,7 +38,7 @@ settings! {
         /// Appearances.
         pub colors: MixtureSettings = MixtureSettings::default(),
         /// Number and kinds of garments.
-        pub outfit: OutfitSettings = OutfitSettings::default(),
+        pub outfit: OutfitLabelSettings = OutfitLabelSettings::default(),
         /// Two garments on the torso.
         pub torso: TorsoSettings = TorsoSettings::default(),
         /// Islands.
@@ -70,7 +70,7 @@ settings! {
     }
 
     /// Settings of the number and kinds of garments.
-    pub struct OutfitSettings {
+    pub struct OutfitLabelSettings {
         /// Least difference between the dyes of shoes and skin, light left out: bare feet have up to 0.11, shoes from 0.37.
         pub dye: f64 = 0.2,
         /// Least share of the feet that shoes cover: hems of trousers lie there, too.

@@ -16,7 +16,7 @@ pub use garment::{
 };
 pub use image::{ChartSettings, PaintSettings, PictureSettings, TextureSettings};
 pub use labels::{
-    CameraGainSettings, IslandSettings, LabelSettings, MixtureSettings, OutfitSettings,
+    CameraGainSettings, IslandSettings, LabelSettings, MixtureSettings, OutfitLabelSettings,
     ScanLabelSettings, TorsoSettings, UnseenSettings,
 };
 pub use scan::{CloudSettings, ScanFloorSettings, ScanSettings};

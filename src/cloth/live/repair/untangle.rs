@@ -7,7 +7,7 @@ use super::untangler::Untangler;
 use crate::contact::SurfaceFrame;
 use crate::live::outfit_model::Model;
 use crate::live::state::{GarmentState, State};
-use crate::settings::{Config, RepairSettings};
+use crate::settings::{ClothRepairSettings, Config};
 use tryon_garment::Region;
 use tryon_geometry::math::{P3, V3d};
 
@@ -174,7 +174,7 @@ impl GarmentState {
         from: &V3d,
         displacement: V3d,
         body: &SurfaceFrame,
-        limits: &RepairSettings,
+        limits: &ClothRepairSettings,
     ) {
         let outside = outside_skin(from, displacement, self.nearest[v], body, limits);
         self.positions[v] = P3::from((from + outside).cast::<f32>());
@@ -187,7 +187,7 @@ fn outside_skin(
     mut displacement: V3d,
     nearest: [u32; 2],
     body: &SurfaceFrame,
-    limits: &RepairSettings,
+    limits: &ClothRepairSettings,
 ) -> V3d {
     for v in nearest {
         let (Some(at), Some(normal)) =
@@ -219,7 +219,7 @@ mod tests {
             vertices: vec![P3::origin()],
             normals: vec![V3::y()],
         };
-        let limits = &RepairSettings::default();
+        let limits = &ClothRepairSettings::default();
         let down = V3d::new(0.002, -0.01, 0.0);
         let near = V3d::new(0.0, 0.003, 0.0);
         let left = near + outside_skin(&near, down, [0, 7], &body, limits);
