@@ -3,6 +3,7 @@
 //! With `a = (1+ω)²/(1+2ω)`, `b = ω²/(1+2ω)`, `γ = (1+ω)/(1+2ω)` and the ratio `ω` of this step to the last one, the
 //! second-order backward difference (BDF2) of a variable step reads `x − a xₙ + b xₙ₋₁ = γ h v`. `ω = 0` is implicit Euler.
 
+use crate::settings::TimeScheme;
 use serde::{Deserialize, Serialize};
 use tryon_geometry::math::{P3, V3d};
 
