@@ -63,9 +63,9 @@ fn a_waving_arm_leaves_the_hem_asleep_and_cloth_near_where_it_would_be() {
     for (base, noise) in [(Config::default(), 0.0), (Config::tracked(), 1.5e-3)] {
         let whole = Config {
             sleep_regions: false,
-            ..base.clone()
+            ..base
         };
-        let truth = run(&never(base.clone()), Motion::Waving, 90, noise);
+        let truth = run(&never(base), Motion::Waving, 90, noise);
         let whole_outfit = run(&whole, Motion::Waving, 30, noise);
         let r = run(&base, Motion::Waving, 90, noise);
         let apart = r.apart(&truth).map(|d| d * 1e3);
@@ -99,7 +99,7 @@ fn nothing_stays_behind_when_the_subject_walks_off() {
     for edge in edges {
         let mut subject = RestingSubject::new(&outfit(&["skirt", "tshirt"], edge), None).unwrap();
         let truth = subject
-            .run(&never(base.clone()), Motion::WalkingOff, 30, 0.0)
+            .run(&never(base), Motion::WalkingOff, 30, 0.0)
             .unwrap();
         let r = subject.run(&base, Motion::WalkingOff, 30, 0.0).unwrap();
         let apart = r.apart(&truth).map(|d| d * 1e3);
@@ -136,7 +136,7 @@ fn searches_left_out_change_next_to_nothing() {
     let skip = never(Config::default());
     let ask = Config {
         cull_distant: false,
-        ..skip.clone()
+        ..skip
     };
     let (r, truth) = (
         run(&skip, Motion::Lifting, 30, 0.0),

@@ -201,13 +201,13 @@ pub fn measure_rest(
     use Motion::{Lifting, Standing, WalkingOff, Waving};
     let mut subject = RestingSubject::new(outfit, arms)?;
     let bodies = [
-        ("exact", outfit.config.clone(), 0.0),
+        ("exact", outfit.config, 0.0),
         ("tracked", Config::tracked(), 1.5e-3),
     ];
     for (body, config, noise) in bodies {
         let never = Config {
             sleep: false,
-            ..config.clone()
+            ..config
         };
         for motion in [Standing, Waving, Lifting, WalkingOff] {
             let scene = format!("{body} {motion:?}");
