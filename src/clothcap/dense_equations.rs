@@ -4,10 +4,12 @@ use crate::CaptureError;
 use crate::settings::ModelFitSettings;
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
-/// Jᵀ W J and Jᵀ W r.
+/// Normal equations `h x = g` of residuals r with Jacobian J and weights W.
 #[derive(Clone, Debug)]
 pub(crate) struct DenseEquations {
+    /// Jᵀ W J, shape `[n][n]`.
     pub(crate) h: DMatrix<f64>,
+    /// −Jᵀ W r, shape `[n]`.
     pub(crate) g: DVector<f64>,
 }
 
