@@ -201,31 +201,44 @@ fn a_bad_frame_costs_only_itself() {
     );
 }
 
-#[test]
-fn cloth_in_a_scene_file_hangs_from_its_pins() {
-    let dir = tempfile::tempdir().unwrap();
+/// Simulates a square of 0.1 m that hangs from two corners, into `out` below `dir`. Membrane stiffness in N/m.
+fn simulate_square(dir: &Path, stiffness: f64) -> Output {
     std::fs::write(
-        dir.path().join("sheet.obj"),
+        dir.join("sheet.obj"),
         "v 0 1 0\nv 0.1 1 0\nv 0.1 0.9 0\nv 0 0.9 0\nf 1 2 3\nf 1 3 4\n",
     )
     .unwrap();
     let scene = json!({
         "mesh": "sheet.obj", "pinned_vertices": [0, 1],
-        "material": {"area_density_kg_m2": 0.2, "thickness_m": 4e-4, "young_membrane_N_m": 500.0, "poisson": 0.3,
+        "material": {"area_density_kg_m2": 0.2, "thickness_m": 4e-4, "young_membrane_N_m": stiffness, "poisson": 0.3,
             "bending_rigidity_N_m": 1e-5, "friction": 0.3},
         "gravity": [0.0, -9.81, 0.0], "duration_s": 0.2, "output_fps": 60.0
     });
-    let file = dir.path().join("scene.json");
+    let file = dir.join("scene.json");
     std::fs::write(&file, scene.to_string()).unwrap();
-    let (scene, out) = (file.display().to_string(), dir.path().join("out"));
-    let run = tryon(&[
-        "simulate",
-        "--scene",
-        &scene,
-        "--out",
-        &out.display().to_string(),
-    ]);
+    let (scene, out) = (file.display().to_string(), dir.join("out"));
+    let out = out.display().to_string();
+    tryon(&["simulate", "--scene", &scene, "--out", &out])
+}
+
+#[test]
+fn cloth_too_stiff_for_its_substeps_is_said_to_be_softened() {
+    let dir = tempfile::tempdir().unwrap();
+    let run = simulate_square(dir.path(), 1e12);
+    let said = text(&run.stderr);
+    assert!(
+        run.status.success() && said.contains("% of its stiffness") && said.contains("offline"),
+        "{said}"
+    );
+}
+
+#[test]
+fn cloth_in_a_scene_file_hangs_from_its_pins() {
+    let dir = tempfile::tempdir().unwrap();
+    let run = simulate_square(dir.path(), 500.0);
     assert!(run.status.success(), "{}", text(&run.stderr));
+    assert!(!text(&run.stderr).contains("stiffness"));
+    let out = dir.path().join("out");
     let report: Value =
         serde_json::from_slice(&std::fs::read(out.join("report.json")).unwrap()).unwrap();
     assert_eq!(
