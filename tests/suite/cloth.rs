@@ -12,6 +12,7 @@ use tryon::garment::{Size, Triangulation, library};
 use tryon::geometry::math::{Body, P3, Rigid, V3, V3d, World, log_so3};
 use tryon::geometry::par::with_threads;
 use tryon::geometry::spatial::intersections;
+use tryon_bench::Solid;
 
 struct Dressed {
     model: Model,
@@ -304,17 +305,10 @@ fn crossing(from: &P3, way: &V3, [a, b, c]: &[P3; 3]) -> Option<f32> {
     (det != 0.0 && u >= 0.0 && w >= 0.0 && u + w <= 1.0).then(|| e2.dot(&q) / det)
 }
 
-/// Vertices of cloth more than 5 mm under the skin: a ray from there leaves the body once more than it enters it.
+/// Vertices of cloth more than 5 mm under the skin.
 fn under_the_skin(cloth: &[P3], body: &[P3], faces: &[[u32; 3]]) -> usize {
-    let way = V3::new(0.21, 0.13, 0.97);
-    let deep = |p: &&P3| body.iter().all(|v| (v - **p).norm() > 5e-3);
-    let inside = |p: &&P3| {
-        let crossed = |f: &&[u32; 3]| {
-            crossing(p, &way, &f.map(|i| body[i as usize])).is_some_and(|t| t > 0.0)
-        };
-        faces.iter().filter(crossed).count() % 2 == 1
-    };
-    cloth.iter().filter(deep).filter(inside).count()
+    let solid = Solid::new(body, faces);
+    cloth.iter().filter(|p| solid.depth(p) > 5e-3).count()
 }
 
 /// Distance of the skirt outside the shirt (m), at each skirt vertex that the shirt surrounds: along a horizontal ray

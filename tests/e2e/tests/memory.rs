@@ -21,11 +21,11 @@ use tryon_proto::v1::*;
 static ALLOCATOR: cap::Cap<Zeroing> = cap::Cap::new(ZEROING, usize::MAX);
 
 /// Sessions before the first count: buffers of transports, tables, thread pools and epochs have grown by then.
-const WARM: usize = 20;
+const WARM: usize = 10;
 /// Sessions between two counts.
 const EVERY: usize = 10;
 /// Sessions after the first count; the variable asks for more.
-const COUNTED: usize = 30;
+const COUNTED: usize = 20;
 const SESSIONS: &str = "TRYON_SESSIONS";
 /// Most bytes of a session that stay. One body is 0.5 MB, one outfit 3 MB. Over 180 sessions 0.9 kB of each stay, in nodes
 /// of epochs, of which a thread holds 64 at the most (docs/decisions/074); 3.3 kB over 30 on a busy machine, where samples of

@@ -21,7 +21,9 @@ use tryon_proto::v1::*;
 /// Session that is dressed.
 const MINE: &str = "mine";
 /// Vertices that are asked for.
-const VERTICES: u32 = 2000;
+const VERTICES: u32 = 1000;
+/// Vertices of a drape that is still at work when it is cancelled or its session ends.
+const LONG: u32 = 5000;
 /// Largest message of cloth, bytes.
 const MAX_BYTES: usize = 16 << 20;
 
@@ -180,7 +182,7 @@ fn a_session_is_draped_fine_for_its_owner_alone() {
         motion_is_recorded(&mut mine, &mut preview).await;
         a_cancelled_motion_continues(&guarded, &mut mine, &mut preview).await;
 
-        let endless = start(&mut mine, &mut preview, &drape(MINE, 50_000)).await;
+        let endless = start(&mut mine, &mut preview, &drape(MINE, LONG)).await;
         let endless = endless.simulation_id;
         let followed = mine.follow_simulation(follow(&endless)).await;
         let mut running = followed.expect("followed").into_inner();
@@ -372,9 +374,9 @@ async fn exposures(
     Ok((exposures, count))
 }
 
-/// Each exposure of half a second is a frame, in order.
+/// Each exposure of a short motion is a frame, in order.
 async fn motion_is_recorded(mine: &mut Cloth, preview: &mut Preview) {
-    const SECONDS: f32 = 0.5;
+    const SECONDS: f32 = 0.2;
     for _ in 0..TRIES {
         let started = start(mine, preview, &motion(SECONDS)).await;
         assert_eq!(started.frame_count, 0, "not known yet");
@@ -415,7 +417,7 @@ async fn continued(
     mine: &mut Cloth,
     preview: &mut Preview,
 ) -> Result<(), Status> {
-    const SECONDS: f32 = 0.5;
+    const SECONDS: f32 = 0.2;
     let started = start(mine, preview, &motion(SECONDS)).await;
     let id = started.simulation_id;
     cannot_be_continued(mine, &id).await?;
@@ -479,7 +481,7 @@ async fn strangers_are_refused(guarded: &Guarded, mine: &mut Cloth, preview: &mu
     let garments = theirs.stream_garments(stream(MINE)).await;
     let garments = garments.expect_err("not theirs");
     assert_eq!(garments.code(), Code::PermissionDenied);
-    let running = start(mine, preview, &drape(MINE, 50_000)).await;
+    let running = start(mine, preview, &drape(MINE, LONG)).await;
     let id = running.simulation_id;
     let another = theirs.start_simulation(drape(MINE, VERTICES)).await;
     let followed = theirs.follow_simulation(follow(&id)).await;
