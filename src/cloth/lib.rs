@@ -32,7 +32,7 @@
 //! - Eight floats at once: [`mod@live::solver::explicit::simd`].
 //! - XPBD: [`mod@live::solver::xpbd`].
 //! - Skin contact: [`mod@live::contact::body_contact`].
-//! - Outer garments over inner ones: [`mod@live::contact::layer_height`], [`mod@live::contact::cloth_contact`].
+//! - Cloth on cloth: [`mod@live::contact::pair_contact`].
 //! - Folds of one garment: [`mod@live::contact::self_contact`].
 //! - Islands that sleep and wake: [`mod@live::sleep::islands`].
 //! - Thresholds: [`mod@live::sleep::criteria`].

@@ -187,8 +187,13 @@ impl SurfaceModel {
 
     /// The point lies on the border of an open surface, where inside and outside are undefined.
     pub fn is_on_border(&self, c: &ClosestPoint) -> bool {
-        let f = self.faces[c.face as usize];
-        (0..3).all(|k| c.weights[k] < self.settings.min_weight || self.border[f[k] as usize])
+        self.is_border_point(c.face, c.weights)
+    }
+
+    /// The same for a point of a face by its barycentric weights.
+    pub fn is_border_point(&self, face: u32, weights: [f32; 3]) -> bool {
+        let f = self.faces[face as usize];
+        (0..3).all(|k| weights[k] < self.settings.min_weight || self.border[f[k] as usize])
     }
 
     /// Constraint that keeps `p` below an open surface worn over it, from the closest point `hit`.

@@ -2,7 +2,6 @@
 
 use super::contact::anchor::pin_anchors;
 use super::contact::body_contact::BodyContacts;
-use super::contact::cloth_contact::{ClothContacts, gather_sheets};
 use super::outfit_model::Model;
 use super::patch::for_patches;
 use super::solver::explicit::{Exemptions, FoldActivation, FoldLimit};
@@ -23,7 +22,7 @@ pub(super) struct CollideInterval {
     pub(super) fastest: f32,
 }
 
-/// Generates anchors, fold limits and contact planes at the beginning of an interval.
+/// Generates anchors, fold limits, contact planes and near pairs of cloth at the beginning of an interval.
 pub(super) fn collide(
     model: &Model,
     state: &State,
@@ -37,7 +36,7 @@ pub(super) fn collide(
         patches,
         chunks,
         body,
-        sheets,
+        pairs,
         ..
     } = work;
     let (par, after) = (model.config.par, state.body.frame());
@@ -53,15 +52,8 @@ pub(super) fn collide(
         fastest: interval.fastest,
         span,
         frames: state.frames,
-        layer_heights: &work.layer_heights,
         garments: &state.garments,
         maps: (index == 0).then_some(&work.maps),
-    };
-    gather_sheets(model, patches, span, sheets);
-    let cloth = ClothContacts {
-        model,
-        sheets,
-        span,
     };
     for_patches(model, patches, |g, k, p| {
         pin_anchors(model, g, k, &contacts, p);
@@ -83,10 +75,13 @@ pub(super) fn collide(
         FoldLimit::find_active(patch, &p.motion, &activation, &mut p.fold_limits);
     });
     let patches = &*patches;
+    if index == 0 {
+        pairs.begin(model, state, patches, interval.dt);
+    }
+    pairs.query(model, patches, span);
     par::for_chunks(par, chunks, 1, |_, c| {
         let c = &mut c[0];
         contacts.generate(&patches[c.at], c);
-        cloth.generate(&patches[c.at], c);
     });
 }
 

@@ -21,6 +21,8 @@ pub(super) struct PatchWork {
     pub(super) pins: Vec<Pin>,
     /// Active fold limits of the current interval.
     pub(super) fold_limits: Vec<FoldLimit>,
+    /// Contact planes of cloth in the current block.
+    pub(super) cloth_planes: Vec<ContactPlane>,
     /// Contact planes within reach for some substeps: `body_planes` of the body, then those of cloth.
     pub(super) planes: Vec<ContactPlane>,
     pub(super) body_planes: usize,
@@ -43,6 +45,24 @@ impl PatchWork {
     pub(super) fn velocity(&self, i: usize) -> V3 {
         let v = self.motion.velocity[i].0;
         V3::new(v[0], v[1], v[2])
+    }
+    /// Position `to` for vertex `i`, moved back where it passes contact planes of cloth farther than the vertex does now,
+    /// `t` seconds after their query; metres.
+    pub(super) fn held_by_cloth(&self, i: usize, mut to: V4, t: f32) -> V4 {
+        /// Passes over planes that meet at an angle.
+        const PASSES: usize = 2;
+        let at = self.motion.position(i);
+        let first = self
+            .cloth_planes
+            .partition_point(|p| (p.vertex as usize) < i);
+        let own = |p: &&ContactPlane| p.vertex as usize == i;
+        for _ in 0..PASSES {
+            for p in self.cloth_planes[first..].iter().take_while(own) {
+                let lacking = p.gap(at, t).min(0.0) - p.gap(to, t);
+                to = to + p.normal.scale(lacking.max(0.0));
+            }
+        }
+        to
     }
 }
 

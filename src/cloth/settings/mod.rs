@@ -18,7 +18,9 @@ pub use fine::{
     ContactSettings, DrapeSettings, NewtonSettings, ObstacleSpring, OfflineSettings,
     OfflineStartSettings, SleepSettings, TimeScheme,
 };
-pub use live::{ClothContactSettings, Config, LiveStepSettings, SelfContactSettings};
+pub use live::{
+    ClothContactSettings, Config, LiveStepSettings, NearPairSettings, SelfContactSettings,
+};
 pub use repair::{ClothRepairSettings, SleeveSettings, UntanglerSettings};
 pub use scene::SceneSettings;
 pub use solver::{FoldSettings, SolverSettings};

@@ -46,6 +46,8 @@ settings! {
         pub body_recovery: f32 = 1.0,
         /// The same for cloth on the wrong side of cloth, where the body may be in the way.
         pub cloth_recovery: f32 = 0.3,
+        /// Substeps between two enforcements of the planes of cloth.
+        pub cloth_interval: usize = 1,
         /// Limits of folds.
         pub folds: FoldSettings = FoldSettings::default(),
     }

@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use tryon_bench::OutfitSpec;
 use tryon_bench::people::PeoplePlan;
 use tryon_bench::tracking_plan::TrackingPlan;
+use tryon_bench::worn::WornMotion;
 
 /// Run time against error, methods side by side: tables as Markdown and JSON.
 #[derive(Debug, Parser)]
@@ -30,6 +31,8 @@ pub(crate) enum Command {
     Dance(DanceArgs),
     /// Sleeping cloth on a body that stands, waves, lifts an arm or walks off.
     Standing(StandingArgs),
+    /// Outfits worn through motions: crossings of cloth with cloth, speed at rest, stretch, time.
+    Worn(WornArgs),
     /// Dress bodies and draw each outfit from several sides.
     Turntable(TurntableArgs),
     /// Tracking of everyone who walks in: people, postures and sides from nothing, stills and recordings.
@@ -159,6 +162,35 @@ pub(crate) struct StandingArgs {
     /// Angle of straight arms below the horizontal (degrees): 75 hang; without it they are off the trunk.
     #[arg(long, value_name = "A")]
     pub(crate) arms: Option<f64>,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct WornArgs {
+    /// Folder for worn.md and worn.json.
+    #[arg(long, value_name = "DIR")]
+    pub(crate) out: PathBuf,
+    /// Garments of the library worn together, innermost first; without any, each of the library.
+    #[arg(long, value_name = "A+B", value_delimiter = ',')]
+    pub(crate) garment: Vec<String>,
+    /// Motions.
+    #[arg(
+        long,
+        value_delimiter = ',',
+        default_value = "standing,calm,charleston,jacks"
+    )]
+    pub(crate) motion: Vec<WornMotion>,
+    /// Edge length of the triangles (m), as worn without it.
+    #[arg(long, value_name = "M")]
+    pub(crate) edge: Option<f64>,
+    /// Settings of the simulation as JSON; by default those of a tracked body.
+    #[arg(long, value_name = "JSON", default_value = r#"{"steady":0.008}"#)]
+    pub(crate) set: String,
+    /// Worker threads.
+    #[arg(long, value_name = "N", default_value_t = 2)]
+    pub(crate) threads: usize,
+    /// Folder of the shared data.
+    #[arg(long, value_name = "DIR", default_value = "../shared/data")]
+    pub(crate) data: PathBuf,
 }
 
 #[derive(Debug, Args)]

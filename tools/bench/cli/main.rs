@@ -22,6 +22,7 @@ fn main() -> ExitCode {
         Command::Cloth(a) => measure::cloth(&a),
         Command::Dance(a) => measure::dance(&a),
         Command::Standing(a) => measure::standing(&a),
+        Command::Worn(a) => measure::worn(&a),
         Command::People(a) => measure::people(&a),
         Command::Clothcap(a) => measure::clothcap(&a),
         Command::Ccd(a) => ccd::run(&a),

@@ -1,10 +1,13 @@
 //! Tables of run time against error.
 
-use crate::args::{ClothArgs, ClothcapArgs, DanceArgs, PeopleArgs, StandingArgs, TrackingArgs};
+use crate::args::{
+    ClothArgs, ClothcapArgs, DanceArgs, PeopleArgs, StandingArgs, TrackingArgs, WornArgs,
+};
 use crate::progress::progress;
 use anyhow::Result;
 use std::path::Path;
 use std::process::ExitCode;
+use tryon::garment::{Triangulation, library};
 use tryon::geometry::par::with_threads;
 use tryon_bench::cloth_offline::{self, OfflineBench};
 use tryon_bench::dance::load;
@@ -13,7 +16,8 @@ use tryon_bench::garment_capture::{
 };
 use tryon_bench::people;
 use tryon_bench::rest::measure_rest;
-use tryon_bench::{Table, cloth};
+use tryon_bench::worn::Wearer;
+use tryon_bench::{OutfitSpec, Table, cloth};
 
 /// Frames of the dress without --frames.
 const DRESS_FRAMES: usize = 4;
@@ -106,6 +110,36 @@ pub(crate) fn standing(args: &StandingArgs) -> Result<ExitCode> {
     })??;
     bar.finish_and_clear();
     finish(&table, &worn.out)
+}
+
+/// Runs `tryon-bench worn`.
+pub(crate) fn worn(args: &WornArgs) -> Result<ExitCode> {
+    let edge = args.edge.unwrap_or(Triangulation::default().edge_length);
+    let config = serde_json::from_str(&args.set)?;
+    let outfits = wanted(&args.garment, library::names());
+    let outfits = outfits.iter().map(|garments| OutfitSpec {
+        garments: garments.split('+').map(str::to_owned).collect(),
+        edge,
+        config,
+    });
+    let outfits: Vec<_> = outfits.collect();
+    let bar = progress(
+        Some((args.motion.len() * outfits.len()) as u64),
+        "measuring",
+    );
+    let mut table = Table::new("worn", "one step of 1/30 s, mean");
+    with_threads(args.threads, || -> Result<()> {
+        for motion in &args.motion {
+            let wearer = Wearer::new(*motion, &args.data)?;
+            for outfit in &outfits {
+                table.rows.push(wearer.row(outfit, &wearer.wear(outfit)?));
+                bar.inc(1);
+            }
+        }
+        Ok(())
+    })??;
+    bar.finish_and_clear();
+    finish(&table, &args.out)
 }
 
 /// Runs `tryon-bench people`.

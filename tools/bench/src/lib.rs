@@ -15,6 +15,7 @@
 //! - Joint and surface errors: [`mod@tracking`].
 //! - Captured garments against truth: [`mod@garment_capture::score`].
 //! - The dance: [`mod@dance`].
+//! - Outfits worn through motions: [`mod@worn`].
 //! - Dressed scans with truth per point: [`mod@scans::scene`].
 //! - The embedded body: [`mod@made_body::figure`] (proportions), [`mod@made_body::field`] (surface),
 //!   [`mod@made_body::rig`], [`mod@made_body::directions`] (shape space), [`mod@made_body::statistics`] (published measurements).
@@ -45,6 +46,7 @@ mod sheet;
 mod table;
 pub mod tracking;
 pub mod tracking_plan;
+pub mod worn;
 
 pub use depth_scene::{DepthScene, SceneTruth};
 pub use error::EvaluateError;

@@ -1,7 +1,8 @@
 //! Untangles worn garments now and then, and smooths cloth that stays intersected.
 //!
-//! Contact keeps a fold on its side, also where that is the wrong one. So each garment is queried as a whole from time to
-//! time, and intersecting cloth moves apart a little. Where that does not help for some queries, it is smoothed locally.
+//! Contact keeps cloth on its side, also where that is the wrong one. So each garment is queried as a whole from time to
+//! time, and in every step while it intersects itself; intersecting cloth moves apart a little. Where that does not help for
+//! some queries, it is smoothed locally.
 
 use super::untangler::Untangler;
 use crate::contact::SurfaceFrame;
@@ -52,11 +53,12 @@ impl UntangleWork {
         }
         let every = (untangle / dt).round().max(1.0) as u64;
         // In turn, so that the cost is spread over steps.
-        let is_due = |k: &usize| (state.frames + *k as u64).is_multiple_of(every);
-        let due: Vec<usize> = (0..model.garments.len()).filter(is_due).collect();
+        let is_due = |k: usize| (state.frames + k as u64).is_multiple_of(every);
         let mut found = 0;
-        for k in due {
-            if self.load(model, state, k) {
+        for k in 0..model.garments.len() {
+            // Intersecting cloth has no contact: it moves apart in every step, or more of it would follow.
+            let intersects = !state.garments[k].intersecting.is_empty();
+            if (is_due(k) || intersects) && self.load(model, state, k) {
                 found += self.untangle(model, &mut state.garments[k], k, body);
                 self.smooth_stuck(model, &mut state.garments[k], k, body);
             }

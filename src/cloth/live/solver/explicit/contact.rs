@@ -132,6 +132,21 @@ impl PatchState {
         }
         touched
     }
+    /// Removes velocities into the planes without friction, and the part of this substep's recovery that passes them: the
+    /// last word on a vertex whose planes contradict each other.
+    pub fn hold_contacts(&mut self, planes: &[ContactPlane], t: f32, h: f32) {
+        for p in planes {
+            let i = p.vertex as usize;
+            let passed = self.scratch.recovered[i].dot(p.normal).min(0.0);
+            let gap = p.gap(self.position(i), t).min(0.0);
+            let back = p.normal.scale(-gap.max(passed));
+            self.displacement[i] = self.displacement[i] + back;
+            self.scratch.recovered[i] = self.scratch.recovered[i] + back;
+            let a = Approach::new(p, self.position(i), self.velocity[i], t, h);
+            let lacking = (a.least - a.normal).max(0.0);
+            self.velocity[i] = self.velocity[i] + p.normal.scale(lacking);
+        }
+    }
     /// Moves a vertex out along a plane's normal, without undoing the recovery from opposite planes.
     fn recover(&mut self, p: &ContactPlane, distance: f32) {
         let i = p.vertex as usize;
@@ -175,6 +190,32 @@ mod tests {
             state.resolve_contacts(&[plane], 0.0, 1e-3, RECOVERY);
         }
         state.displacement[0]
+    }
+
+    #[test]
+    fn held_planes_take_back_recovery_and_velocity_that_pass_them() {
+        let mut state = PatchState::default();
+        state.reset(
+            [V4::default()].into_iter(),
+            [V4::new(0.0, 1.0, 0.0)].into_iter(),
+        );
+        let plane = |x: f32, offset: f32| ContactPlane {
+            normal: V4::new(x, 0.0, 0.0),
+            offset,
+            velocity: V4::new(0.3, 0.0, 0.0),
+            ..ContactPlane::default()
+        };
+        let (skin, cloth) = (plane(1.0, 0.01), plane(-1.0, -2e-4));
+        state.resolve_contacts(&[skin], 0.0, 1e-3, RECOVERY);
+        assert_eq!(state.displacement[0], V4::new(1e-3, 0.0, 0.0));
+        state.hold_contacts(&[cloth], 0.0, 1e-3);
+        let V4([x, ..]) = state.displacement[0];
+        assert!((x - 2e-4).abs() < 1e-9, "{x} m, the plane is at 0.2 mm");
+        let V4([u, v, ..]) = state.velocity[0];
+        assert!(
+            (u - 0.3).abs() < 1e-6 && v == 1.0,
+            "{u} {v} m/s: with the plane, sliding"
+        );
     }
 
     #[test]
