@@ -54,6 +54,14 @@ impl<F> Pose<F> {
             angles: vec![0.0; skeleton.dofs()],
         }
     }
+    /// The same pose in frame `G`, in which `F` lies at `g_from_f`.
+    #[must_use]
+    pub fn transformed<G>(&self, g_from_f: &Rigid<G, F>) -> Pose<G> {
+        Pose {
+            root: *g_from_f * self.root,
+            angles: self.angles.clone(),
+        }
+    }
     /// Local rotation vector of a joint (axis × angle, rest frame).
     pub fn rotation_vector(&self, skeleton: &Skeleton, joint: usize) -> Vector3<f64> {
         let at = skeleton.dof_offset(joint);

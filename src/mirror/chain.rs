@@ -9,7 +9,7 @@ use super::painter::{CapturedView, DrawnOutfit, OutfitPainter};
 use super::report::{MirrorFrame, StageTimer};
 use super::wear::{SizeState, Wear};
 use std::sync::Arc;
-use tryon_body::{BodyShape, Pose, Template};
+use tryon_body::{BodyShape, Template};
 use tryon_geometry::camera::{Calibration, ColorImage, RgbdFrame};
 use tryon_geometry::math::P3;
 use tryon_tracking::{Status, TrackerConfig, TrackerModel, TrackerState};
@@ -167,10 +167,7 @@ impl Mirror {
     fn follow(&mut self) -> Result<bool, MirrorError> {
         let is_sized = self.tracked.status == Status::Tracking;
         let world_from_camera = self.tracked.world_from_camera;
-        let pose = Pose {
-            root: world_from_camera * self.tracked.pose.root,
-            angles: self.tracked.pose.angles.clone(),
-        };
+        let pose = self.tracked.pose.transformed(&world_from_camera);
         let subject = Subject {
             template: self.tracker.template(),
             rest: self.posed.rest(),

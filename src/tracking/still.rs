@@ -143,10 +143,7 @@ pub fn find_still_person(
     let mut state = TrackerState::new(&model);
     steps.run(&model, &mut state, frame, &mut Workspace::default())?;
     Ok(state.status.is_live().then(|| StillPerson {
-        pose: Pose {
-            root: camera.world_from_camera * state.pose.root,
-            angles: state.pose.angles,
-        },
+        pose: state.pose.transformed(&camera.world_from_camera),
         shape: state.shape,
     }))
 }

@@ -219,6 +219,7 @@ fn coordinates_and_colours_that_are_not_numbers_are_counted_or_refused() {
     let template: Arc<Template> = embedded::template();
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("spoiled.ply");
+    // One test tells all numbers that are not finite: the second kind is shown once.
     let some = [(0.3, 0.3)];
     let all = [(0.3, 0.3), (1.0, 0.0), (0.0, 1.0)];
     let cases: [(&str, &[(f32, f32)]); 3] = [("nan", &all), ("-inf", &some), ("1e30", &all)];

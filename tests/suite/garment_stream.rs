@@ -1,11 +1,10 @@
 //! Garments on a moving subject, coded and read back.
 
-use tryon::body::Pose;
 use tryon::cloth::{self, Input};
 use tryon::dressing::{DressOptions, dress};
 use tryon::formats::{POSITION_STEP, PositionCoder};
 use tryon::garment::{Size, library};
-use tryon::geometry::math::{P3, World};
+use tryon::geometry::math::P3;
 use tryon::synth::{Actor, Sequence, Setting};
 
 /// Bytes a vertex and frame that a stream may take (the goal is 2).
@@ -20,13 +19,7 @@ fn moving_garments_take_few_bytes_and_lose_nothing() {
         let truth = sequence.truth(i);
         let mut world: Vec<P3> = Vec::new();
         world_from_camera.points_f32(&truth.vertices, &mut world);
-        (
-            Pose::<World> {
-                root: world_from_camera * truth.pose.root,
-                angles: truth.pose.angles,
-            },
-            world,
-        )
+        (truth.pose.transformed(&world_from_camera), world)
     };
     // From the second in which the arms are raised.
     let begin = 150;

@@ -10,7 +10,7 @@ use crate::scan::BodyScan;
 use crate::segment::{BodyRegion, unseen_regions};
 use crate::settings::{AlignmentSettings, FreeSurfaceSettings, LabelSettings, TurnConfig};
 use std::sync::Arc;
-use tryon_body::{BodyShape, BoneTransforms, Pose, Template, skin};
+use tryon_body::{BodyShape, BoneTransforms, Template, skin};
 use tryon_geometry::math::{Camera, P3, P3d, Rigid, World};
 use tryon_geometry::par::Par;
 
@@ -99,10 +99,7 @@ fn key_reports(
 /// Tracked body of a frame in the world, without displacements.
 fn body_of(keys: &KeyFrames, key: &KeyFrame) -> AlignedBody {
     AlignedBody {
-        pose: Pose {
-            root: keys.world_from_camera * key.pose.root,
-            angles: key.pose.angles.clone(),
-        },
+        pose: key.pose.transformed(&keys.world_from_camera),
         shape: BodyShape {
             displacements: Vec::new(),
             ..keys.shape.clone()

@@ -24,7 +24,7 @@ static ALLOCATOR: cap::Cap<Zeroing> = cap::Cap::new(ZEROING, usize::MAX);
 const WARM: usize = 10;
 /// Sessions between two counts.
 const EVERY: usize = 10;
-/// Sessions after the first count; the variable asks for more.
+/// Sessions after the first count: few enough that one body that stays shows (25 kB of each). The variable asks for more.
 const COUNTED: usize = 20;
 const SESSIONS: &str = "TRYON_SESSIONS";
 /// Most bytes of a session that stay. One body is 0.5 MB, one outfit 3 MB. Over 180 sessions 0.9 kB of each stay, in nodes

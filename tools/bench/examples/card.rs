@@ -53,10 +53,7 @@ fn main() {
     let sequence = Sequence::new(Actor::default(), Setting::default());
     let (frame, truth) = sequence.frame(FRAME);
     let world_from_camera = sequence.setting().world_from_camera;
-    let pose = Pose {
-        root: world_from_camera * truth.pose.root,
-        angles: truth.pose.angles.clone(),
-    };
+    let pose = truth.pose.transformed(&world_from_camera);
     let dressed = dressed(&sequence, &pose);
     let meshes = &dressed.model.outfit.garments;
     let world: Vec<Vec<P3>> = (meshes.iter().zip(&dressed.state.garments))

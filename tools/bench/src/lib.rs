@@ -23,6 +23,7 @@
 //! - Everyone who walks in, the bars of a release: [`mod@people::plan`], a file a row beside it.
 #![allow(rustdoc::private_intra_doc_links)] // the index of ideas names private modules
 
+mod body_film;
 pub mod ccd;
 mod ccd_queries;
 pub mod cloth;
@@ -48,6 +49,7 @@ pub mod tracking;
 pub mod tracking_plan;
 pub mod worn;
 
+pub use body_film::BodyFilm;
 pub use depth_scene::{DepthScene, SceneTruth};
 pub use error::EvaluateError;
 pub use inside::Solid;

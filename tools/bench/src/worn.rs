@@ -1,19 +1,16 @@
 //! Outfits worn through whole motions: crossings of cloth with cloth, speed of cloth at rest, stretch and run time.
 
-use super::{EvaluateError, OutfitSpec, Row};
+use super::{BodyFilm, EvaluateError, OutfitSpec, Row};
 use clap::ValueEnum;
 use std::path::Path;
-use std::sync::Arc;
 use std::time::Instant;
-use tryon_body::{Pose, RestBody, Template, embedded, measure};
+use tryon_body::measure;
 use tryon_cloth::{Input, State, Workspace, step};
 use tryon_dressing::{Dressed, suggest};
-use tryon_formats::open_recording;
+use tryon_geometry::math::P3;
 use tryon_geometry::math::order_statistics::percentile;
-use tryon_geometry::math::{Camera, P3, Rigid, World};
 use tryon_geometry::spatial::intersections;
 use tryon_synth::{Actor, Routine, Sequence, Setting};
-use tryon_tracking::{Status, TrackerConfig, TrackerModel, TrackerState};
 
 /// Pictures a second.
 const RATE: f64 = 30.0;
@@ -35,38 +32,27 @@ pub enum WornMotion {
     Jacks,
 }
 
-impl WornMotion {
-    /// Name in tables.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Standing => "standing",
-            Self::Calm => "calm",
-            Self::Charleston => "charleston",
-            Self::Jacks => "jacks",
-        }
-    }
-}
-
-/// Body of a person and its motion.
+/// A person and the motion that they wear outfits through.
 pub struct Wearer {
     motion: WornMotion,
-    template: Arc<Template>,
-    rest: RestBody,
-    /// Pose of the first body.
-    first: Pose<World>,
-    /// Skin of each picture, world (m).
-    bodies: Vec<Vec<P3>>,
+    film: BodyFilm,
 }
 
 fn fault(why: impl ToString) -> EvaluateError {
     EvaluateError::new("worn", why)
 }
 
-fn in_world(place: Rigid<World, Camera>, pose: &Pose<Camera>) -> Pose<World> {
-    Pose {
-        root: place * pose.root,
-        angles: pose.angles.clone(),
-    }
+/// The first pictures of a routine, or all of it.
+fn played(routine: Routine, pictures: Option<u64>) -> BodyFilm {
+    let setting = Setting {
+        routine,
+        rate: RATE,
+        color: false,
+        room: None,
+        ..Setting::default()
+    };
+    let pictures = pictures.unwrap_or((routine.period() * RATE) as u64);
+    BodyFilm::played(&Sequence::new(Actor::default(), setting), pictures)
 }
 
 impl Wearer {
@@ -75,75 +61,14 @@ impl Wearer {
     /// # Errors
     /// A recording that cannot be read, or shows nobody.
     pub fn new(motion: WornMotion, data: &Path) -> Result<Self, EvaluateError> {
-        let sequence = |name: &str| Self::tracked(motion, &data.join("sequences").join(name));
-        match motion {
-            WornMotion::Standing => Ok(Self::synthetic(motion, Routine::Still, STANDING)),
-            WornMotion::Calm => {
-                let routine = Routine::TryOn;
-                let pictures = (routine.period() * RATE) as u64;
-                Ok(Self::synthetic(motion, routine, pictures))
-            }
-            WornMotion::Charleston => sequence("charleston_m_heavy_tof_room"),
-            WornMotion::Jacks => sequence("jacks_f_avg_kinect1_room"),
-        }
-    }
-
-    fn synthetic(motion: WornMotion, routine: Routine, pictures: u64) -> Self {
-        let setting = Setting {
-            routine,
-            rate: RATE,
-            color: false,
-            room: None,
-            ..Setting::default()
+        let tracked = |name: &str| BodyFilm::tracked(&data.join("sequences").join(name));
+        let film = match motion {
+            WornMotion::Standing => played(Routine::Still, Some(STANDING)),
+            WornMotion::Calm => played(Routine::TryOn, None),
+            WornMotion::Charleston => tracked("charleston_m_heavy_tof_room")?,
+            WornMotion::Jacks => tracked("jacks_f_avg_kinect1_room")?,
         };
-        let place = setting.world_from_camera;
-        let sequence = Sequence::new(Actor::default(), setting);
-        let bodies = (0..pictures).map(|i| {
-            let mut body = Vec::new();
-            place.points_f32(&sequence.truth(i).vertices, &mut body);
-            body
-        });
-        Self {
-            motion,
-            template: sequence.actor().template.clone(),
-            rest: sequence.rest().clone(),
-            first: in_world(place, &sequence.truth(0).pose),
-            bodies: bodies.collect(),
-        }
-    }
-
-    fn tracked(motion: WornMotion, recording: &Path) -> Result<Self, EvaluateError> {
-        let mut source = open_recording(recording).map_err(fault)?;
-        let template = embedded::template();
-        let calibration = source.calibration().clone();
-        let model = TrackerModel::new(template.clone(), calibration, TrackerConfig::default());
-        let mut state = TrackerState::new(&model);
-        let mut work = tryon_tracking::Workspace::default();
-        let (mut bodies, mut begun) = (Vec::new(), None);
-        while let Some(frame) = source.next_frame().map_err(fault)? {
-            tryon_tracking::step(&model, &mut state, &frame, &mut work).map_err(fault)?;
-            if state.status != Status::Tracking {
-                continue;
-            }
-            let (place, mut body) = (state.world_from_camera, Vec::new());
-            place.points_f32(work.posed(&model, &state).0, &mut body);
-            bodies.push(body);
-            let start = || {
-                (
-                    template.personalise(&state.shape),
-                    in_world(place, &state.pose),
-                )
-            };
-            begun.get_or_insert_with(start);
-        }
-        let (rest, first) = begun.ok_or_else(|| fault("nobody is tracked"))?;
-        Ok(Self {
-            motion,
-            template,
-            rest,
-            first,
-            bodies,
-        })
+        Ok(Self { motion, film })
     }
 
     /// Wears an outfit in the suggested sizes through the motion.
@@ -151,12 +76,18 @@ impl Wearer {
     /// # Errors
     /// A garment that is not known, or cannot be put on or simulated.
     pub fn wear(&self, outfit: &OutfitSpec) -> Result<WornReport, EvaluateError> {
-        let measures = measure::measure(&self.template, &self.rest).map_err(fault)?;
+        let BodyFilm {
+            template,
+            rest,
+            start,
+            bodies,
+        } = &self.film;
+        let measures = measure::measure(template, rest).map_err(fault)?;
         let size = |garment: &str| {
             let suggested = suggest(garment, &measures).map_err(|e| e.to_string())?;
             Ok(suggested.size)
         };
-        let dressed = outfit.dress(&self.template, &self.rest, &self.first, size);
+        let dressed = outfit.dress(template, rest, start, size);
         let Dressed {
             model, mut state, ..
         } = dressed.map_err(fault)?;
@@ -167,7 +98,7 @@ impl Wearer {
             ..WornReport::default()
         };
         let (mut work, dt) = (Workspace::default(), 1.0 / RATE);
-        for (i, body) in self.bodies.iter().enumerate() {
+        for (i, body) in bodies.iter().enumerate() {
             let started = Instant::now();
             let r = step(&model, &mut state, &Input { body, dt }, &mut work).map_err(fault)?;
             report.ms.push(started.elapsed().as_secs_f64() * 1e3);
@@ -176,7 +107,7 @@ impl Wearer {
             report.strain.push(r.p99_strain);
             report.faults += usize::from(r.kept_last_good.is_some());
             report.crossings.push(cloth.crossings(&state));
-            if i + AT_REST >= self.bodies.len() {
+            if i + AT_REST >= bodies.len() {
                 let speeds = state.garments.iter().flat_map(|g| &g.velocities);
                 report.speeds.extend(speeds.map(|v| f64::from(v.norm())));
             }
@@ -186,7 +117,9 @@ impl Wearer {
 
     /// Row of an outfit's report.
     pub fn row(&self, outfit: &OutfitSpec, report: &WornReport) -> Row {
-        report.row(self.motion.name(), &outfit.garments.join("+"))
+        let motion = self.motion.to_possible_value();
+        let name = motion.as_ref().map_or("", |m| m.get_name());
+        report.row(name, &outfit.garments.join("+"))
     }
 }
 
@@ -262,5 +195,32 @@ impl WornReport {
             )
             .error("p99_stretch_percent", quantile(&self.strain, 99) * 100.0)
             .error("p95_speed_mm_s", quantile(&self.speeds, 95) * 1e3)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use tryon_cloth::GarmentState;
+
+    #[test]
+    fn an_edge_through_a_face_is_counted_where_it_belongs() {
+        // The upright triangle's first edge passes through the level one, whose longest edge passes through the other.
+        let level = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]].map(P3::from);
+        let upright = [[0.2, 0.2, -1.0], [0.2, 0.2, 1.0], [5.0, 5.0, 0.5]].map(P3::from);
+        let worn = |garments: &[(Vec<[u32; 3]>, Vec<P3>)]| {
+            let mut state = State::default();
+            for (_, positions) in garments {
+                let mut garment = GarmentState::default();
+                garment.positions.clone_from(positions);
+                state.garments.push(garment);
+            }
+            let faces: Vec<_> = garments.iter().map(|g| &g.0).collect();
+            ClothFaces::new(&faces, &state).crossings(&state)
+        };
+        let one = (vec![[0, 1, 2], [3, 4, 5]], [level, upright].concat());
+        assert_eq!(worn(&[one]), [2, 0]);
+        let two = [level, upright].map(|x| (vec![[0, 1, 2]], x.to_vec()));
+        assert_eq!(worn(&two), [0, 2]);
     }
 }

@@ -77,11 +77,8 @@ pub(crate) fn flat(garment: &GarmentMesh) -> Vec<P3> {
 
 /// Pose of the try-on routine in frame `i`.
 fn pose(sequence: &Sequence, i: u64) -> Pose<World> {
-    let p = sequence.truth(i).pose;
-    Pose {
-        root: sequence.setting().world_from_camera * p.root,
-        angles: p.angles,
-    }
+    let world_from_camera = &sequence.setting().world_from_camera;
+    sequence.truth(i).pose.transformed(world_from_camera)
 }
 
 /// The garment on the embedded body, which starts upright over the origin and faces +z: still, or moving with the try-on

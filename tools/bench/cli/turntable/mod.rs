@@ -8,7 +8,7 @@ mod person;
 mod wardrobe;
 
 use crate::args::TurntableArgs;
-use anyhow::{Context, Result};
+use anyhow::Result;
 use drawing::{DrawnMesh, Turn, draw};
 use fitting::Fitting;
 use std::path::Path;
@@ -68,7 +68,7 @@ struct Case<'a> {
 impl Case<'_> {
     /// Adds the dressed body, or the bare one that nothing fits, from all sides.
     fn draw(&self, sheet: &mut Sheet) -> Result<()> {
-        let person = person::load(self.body).with_context(|| self.body.to_owned())?;
+        let person = person::load(self.body)?;
         let template = &person.template;
         let (body, meshes) = match Fitting::dress(self, &person)? {
             Some(mut fitting) => {

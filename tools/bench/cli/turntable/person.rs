@@ -1,21 +1,15 @@
 //! Bodies of the turntable: named shapes, files, and people tracked in recordings.
 
 use crate::args::{TurntableArgs, TurntablePose};
-use anyhow::{Result, anyhow};
+use anyhow::{Context, Result};
 use std::path::Path;
 use std::sync::Arc;
 use tryon::body::import::template_from_smpl;
 use tryon::body::{BodyShape, BoneTransforms, Pose, RestBody, Template, embedded, skin};
 use tryon::formats::npz::read_smpl;
-use tryon::formats::open_recording;
 use tryon::geometry::math::{Body, P3, Rigid, World};
 use tryon::geometry::par::Par;
-use tryon::tracking::{Status, TrackerConfig, TrackerModel, TrackerState, Workspace, step};
-
-/// Showings of a picture that is alone in its recording.
-const STILL: u64 = 45;
-/// Time between two of them (ns).
-const FRAME_NS: u64 = 33_333_333;
+use tryon_bench::BodyFilm;
 
 /// Named shapes: stature, girth, sex, limb length, torso length, shoulders, chest, waist, hip in standard deviations.
 #[rustfmt::skip]
@@ -32,22 +26,19 @@ pub(super) struct Person {
     pub(super) template: Arc<Template>,
     pub(super) rest: RestBody,
     /// Of a recording.
-    pub(super) film: Option<Film>,
-}
-
-/// Body in a recording.
-pub(super) struct Film {
-    /// Pose in which garments are put on.
-    start: Pose<World>,
-    /// The body in each picture after it, world, metres.
-    pub(super) bodies: Vec<Vec<P3>>,
+    pub(super) film: Option<BodyFilm>,
 }
 
 /// Loads a named shape, a body file or a recording.
 pub(super) fn load(name: &str) -> Result<Person> {
     let path = Path::new(name);
     if path.is_dir() || name.ends_with(".mcap") {
-        return tracked(path);
+        let film = BodyFilm::tracked(path)?;
+        return Ok(Person {
+            template: film.template.clone(),
+            rest: film.rest.clone(),
+            film: Some(film),
+        });
     }
     let mut shape = BodyShape::default();
     let template = match SHAPES.iter().find(|s| s.0 == name) {
@@ -55,48 +46,15 @@ pub(super) fn load(name: &str) -> Result<Person> {
             shape.coefficients = coefficients.to_vec();
             embedded::template()
         }
-        None => Arc::new(template_from_smpl("file", &read_smpl(path)?)?),
+        None => {
+            let body = read_smpl(path)?;
+            Arc::new(template_from_smpl("file", &body).with_context(|| name.to_owned())?)
+        }
     };
     Ok(Person {
         rest: template.personalise(&shape),
         template,
         film: None,
-    })
-}
-
-/// The person in a recording, from the first picture in which they are tracked.
-fn tracked(path: &Path) -> Result<Person> {
-    let mut source = open_recording(path)?;
-    let template = embedded::template();
-    let config = TrackerConfig::default();
-    let model = TrackerModel::new(template.clone(), source.calibration().clone(), config);
-    let (mut state, mut work) = (TrackerState::new(&model), Workspace::default());
-    let (mut bodies, mut begun) = (Vec::new(), None);
-    let times = if source.len() == Some(1) { STILL } else { 1 };
-    while let Some(mut frame) = source.next_frame()? {
-        for _ in 0..times {
-            step(&model, &mut state, &frame, &mut work)?;
-            frame.time_ns += FRAME_NS;
-            if state.status != Status::Tracking {
-                continue;
-            }
-            let (mut body, to_world) = (Vec::new(), state.world_from_camera);
-            to_world.points_f32(work.posed(&model, &state).0, &mut body);
-            bodies.push(body);
-            begun.get_or_insert_with(|| {
-                let start = Pose {
-                    root: to_world * state.pose.root,
-                    angles: state.pose.angles.clone(),
-                };
-                (template.personalise(&state.shape), start)
-            });
-        }
-    }
-    let (rest, start) = begun.ok_or_else(|| anyhow!("nobody is tracked"))?;
-    Ok(Person {
-        template,
-        rest,
-        film: Some(Film { start, bodies }),
     })
 }
 

@@ -260,13 +260,7 @@ fn on_motion(
     let sequence = Sequence::new(actor, setting)
         .with_clip(clip)
         .with_context(|| format!("{}", path.display()))?;
-    let pose = |i| {
-        let pose = sequence.truth(i).pose;
-        Pose::<World> {
-            root: world_from_camera * pose.root,
-            angles: pose.angles,
-        }
-    };
+    let pose = |i| sequence.truth(i).pose.transformed(&world_from_camera);
     let first = frames.displacements.into_iter().next();
     let first = first.context("the capture has no finished scan")?;
     let poses: Vec<_> = (0..count.max(1)).map(pose).collect();
