@@ -27,18 +27,16 @@
 //! - Substeps (symplectic Euler): [`mod@live::solver::explicit::substeps`].
 //! - Stable step: [`mod@live::solver::explicit::stability`].
 //! - Mass filter: [`mod@live::solver::explicit::mass_filter`].
-//! - Folds no sharper than triangles resolve: [`mod@live::solver::explicit::fold_limit`].
 //! - Exchange between patches: [`mod@live::solver::explicit::halo`].
 //! - Eight floats at once: [`mod@live::solver::explicit::simd`].
 //! - XPBD: [`mod@live::solver::xpbd`].
 //! - Skin contact: [`mod@live::contact::body_contact`].
-//! - Outer garments over inner ones: [`mod@live::contact::layer_height`], [`mod@live::contact::cloth_contact`].
+//! - Cloth on cloth: [`mod@live::contact::pair_contact`].
 //! - Folds of one garment: [`mod@live::contact::self_contact`].
 //! - Islands that sleep and wake: [`mod@live::sleep::islands`].
 //! - Thresholds: [`mod@live::sleep::criteria`].
 //! - Motion that wakes: [`mod@live::sleep::wake_source`].
 //! - Tangles: [`mod@live::repair::untangle`].
-//! - Sleeves off their arm: [`mod@live::repair::recover_sleeves`].
 //! - A body that teleports: [`mod@live::repair::teleport`].
 //! - The outfit as it was put on: [`mod@live::repair::reference`].
 //!

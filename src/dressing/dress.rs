@@ -4,14 +4,16 @@ use super::body_sections::BodySections;
 use super::error::DressError;
 use super::options::{DressOptions, DressReport, ms};
 use super::outfit_drape::{Wearer, drape_outfit};
+use super::settings::SettlingSettings;
 use super::sew::{GarmentSource, Sewing};
 use std::time::Instant;
 use tryon_body::measure::measure;
 use tryon_body::{Pose, RestBody, Template};
-use tryon_cloth::{ClothError, Config, Model, Outfit, State};
+use tryon_cloth::{ClothError, Config, Input, Model, Outfit, State, Workspace, step};
 use tryon_garment::{GarmentMesh, Pattern};
-use tryon_geometry::math::World;
-use tryon_geometry::par::join;
+use tryon_geometry::math::{V3d, World};
+use tryon_geometry::par::{Par, join};
+use tryon_geometry::spatial::SelfIntersections;
 
 /// A dressed body, ready for [`tryon_cloth::step`].
 #[derive(Debug)]
@@ -93,8 +95,21 @@ pub fn dress_all(
 
     let timer = Instant::now();
     model.set_anchors(draped.anchors);
-    let state = State::on_body(&model, draped.positions, draped.body)?;
+    let mut state = State::on_body(&model, draped.positions, draped.body)?;
     report.stages_ms.model = prepared + ms(timer);
+
+    let timer = Instant::now();
+    let mut finder = CrossingFinder::new(&model, &state);
+    if options.untangle {
+        settle(
+            &mut model,
+            &mut state,
+            &mut finder,
+            &options.stages.settling,
+        )?;
+    }
+    report.crossings = finder.count(&state);
+    report.stages_ms.settle = ms(timer);
     report.ms = ms(started);
     Ok(Dressed {
         model,
@@ -114,6 +129,77 @@ fn simulator(
     let outfit = Outfit { garments, anchors };
     let model = Model::new(template, outfit, *config)?;
     Ok((model, ms(timer)))
+}
+
+/// Lets cloth come to rest in the simulator, on a body that stands still: slowly, as it starts strained, and until no cloth
+/// passes through cloth. Leaves the state with the fewest crossings.
+fn settle(
+    model: &mut Model,
+    state: &mut State,
+    finder: &mut CrossingFinder,
+    settings: &SettlingSettings,
+) -> Result<(), ClothError> {
+    let gentle = Config {
+        max_speed: settings.max_speed,
+        untangle: settings.step,
+        sleep: false,
+        ..*model.config()
+    };
+    let config = model.replace_config(gentle);
+    let body = state.collision_body().vertices().to_vec();
+    let mut work = Workspace::default();
+    let input = Input {
+        body: &body,
+        dt: settings.step,
+    };
+    let [least, most] = settings.steps;
+    let mut best = (usize::MAX, State::default());
+    for k in 0..most {
+        step(model, state, &input, &mut work)?;
+        if k < least {
+            continue;
+        }
+        let crossings = finder.count(state);
+        if crossings < best.0 {
+            best = (crossings, state.clone());
+        }
+        if crossings == 0 {
+            break;
+        }
+    }
+    *state = best.1;
+    model.replace_config(config);
+    Ok(())
+}
+
+/// Finds edges that pass through triangles, of one garment or of two.
+struct CrossingFinder {
+    outfit: SelfIntersections,
+    x: Vec<V3d>,
+}
+
+impl CrossingFinder {
+    fn new(model: &Model, state: &State) -> Self {
+        let (mut faces, mut first) = (Vec::new(), 0);
+        for mesh in &model.outfit.garments {
+            faces.extend(mesh.faces.iter().map(|f| f.map(|v| v + first)));
+            first += mesh.vertices as u32;
+        }
+        let x: Vec<V3d> = Self::positions(state).collect();
+        Self {
+            outfit: SelfIntersections::new(&faces, &x),
+            x,
+        }
+    }
+    fn positions(state: &State) -> impl Iterator<Item = V3d> {
+        let garments = state.garments.iter();
+        garments.flat_map(|g| g.positions.iter().map(|p| p.coords.cast()))
+    }
+    fn count(&mut self, state: &State) -> usize {
+        self.x.clear();
+        self.x.extend(Self::positions(state));
+        self.outfit.find(Par::Rayon, &self.x).len()
+    }
 }
 
 fn check_pose(template: &Template, pose: &Pose<World>) -> Result<(), DressError> {

@@ -40,7 +40,7 @@ pub struct DressReport {
     pub steps: usize,
     /// Deepest garment vertex under the skin at the end, metres.
     pub penetration: f64,
-    /// Edges that pass through triangles of the same garment at the end.
+    /// Edges that pass through triangles at the end, of the same garment or of another.
     pub crossings: usize,
     /// 99th percentile of the stretch at the end, worst garment.
     pub p99_strain: f64,
@@ -63,6 +63,8 @@ pub struct DressMs {
     pub fine: f64,
     /// Preparing the simulator, most of it while the garments are draped.
     pub model: f64,
+    /// Coming to rest in the simulator.
+    pub settle: f64,
 }
 
 /// Milliseconds that have passed.

@@ -15,7 +15,6 @@ use tryon_cloth::contact::CollisionBody;
 use tryon_cloth::{AnchorBinding, ClothError, Sheet};
 use tryon_garment::GarmentMesh;
 use tryon_geometry::math::{P3, World};
-use tryon_geometry::spatial::intersections;
 
 /// Body on which garments are draped.
 #[derive(Clone, Copy, Debug)]
@@ -222,7 +221,6 @@ impl<'a> OutfitDrape<'a> {
             let (deepest, p99) = d.measure(&self.skin);
             report.penetration = report.penetration.max(deepest);
             report.p99_strain = report.p99_strain.max(p99);
-            report.crossings += intersections(&on.mesh.faces, &x).len();
             let anchors = on.bind_in_place(&x);
             (x, anchors)
         };

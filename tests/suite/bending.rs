@@ -3,7 +3,7 @@
 use super::common::{arms_down, posed};
 use crate::common::{DT, step_on};
 use tryon::body::{BodyShape, Pose, RestBody, Template, embedded};
-use tryon::cloth::{Config, StepReport, Workspace};
+use tryon::cloth::{StepReport, Workspace};
 use tryon::dressing::{DressOptions, dress};
 use tryon::garment::{Size, Triangulation, library};
 use tryon::geometry::math::{P3, World};
@@ -33,21 +33,13 @@ fn pose(template: &Template, rest: &RestBody, joints: &[(&str, f64)], call: usiz
 
 /// Someone of average build in one garment bends and stands up again: the report and the crossings of each call, and
 /// where cloth was before and is now, metres.
-fn bend(
-    garment: &str,
-    joints: &[(&str, f64)],
-    sharpest: f64,
-) -> (Vec<StepReport>, Vec<usize>, [Vec<P3>; 2]) {
+fn bend(garment: &str, joints: &[(&str, f64)]) -> (Vec<StepReport>, Vec<usize>, [Vec<P3>; 2]) {
     let t = embedded::template();
     let rest = t.personalise(&BodyShape::default());
     let options = DressOptions {
         triangulation: Triangulation {
             edge_length: 0.018,
             ..Triangulation::default()
-        },
-        config: Config {
-            min_fold_ratio: sharpest,
-            ..Config::default()
         },
         ..DressOptions::default()
     };
@@ -77,55 +69,37 @@ fn bend(
 #[test]
 fn a_long_sleeve_stays_whole_around_an_elbow_that_folds() {
     // 137°: forearm and upper arm lie in each other.
-    let (reports, _, _) = bend(
-        "longsleeve",
-        &[("elbow", 2.4)],
-        Config::default().min_fold_ratio,
-    );
+    let (reports, _, _) = bend("longsleeve", &[("elbow", 2.4)]);
     let worst = |of: fn(&StepReport) -> f64| reports.iter().map(of).fold(0.0, f64::max);
-    let (p99, put_back) = (
-        worst(|r| r.p99_strain),
-        reports.iter().map(|r| r.sleeves_put_back).sum::<usize>(),
-    );
-    println!(
-        "p99 stretch {p99}, most {}, {put_back} rings put back",
-        worst(|r| r.max_strain)
-    );
+    let p99 = worst(|r| r.p99_strain);
+    println!("p99 stretch {p99}, most {}", worst(|r| r.max_strain));
     // Without room inside the elbow 0.38, and torn for good.
     assert!(p99 < 0.18, "{p99}");
     assert!(reports.last().expect("calls").max_strain < 0.6);
     assert!(worst(|r| r.penetration_left) < 0.004);
-    assert_eq!(put_back, 0);
 }
 
 #[test]
-fn trousers_of_someone_who_squats_come_down_again_and_pass_through_themselves_less() {
-    let joints = [("hip", -1.3), ("knee", 1.7)];
-    let [free, braced] = [0.0, Config::default().min_fold_ratio].map(|sharpest| {
-        let (reports, crossed, [before, after]) = bend("trousers", &joints, sharpest);
-        let lowest = |x: &[P3]| x.iter().fold(f32::MAX, |l, p| l.min(p.y));
-        let mean = crossed[..CALLS].iter().sum::<usize>() / CALLS;
-        let p99 = reports.iter().map(|r| r.p99_strain).fold(0.0, f64::max);
-        println!(
-            "{sharpest}: {mean} crossings, p99 stretch {p99}, hem {} m up",
-            lowest(&after) - lowest(&before)
-        );
-        assert!(lowest(&after) - lowest(&before) < 0.05);
-        assert!(p99 < 0.3, "{p99}");
-        mean
-    });
-    assert!(free > 200 && 3 * braced < 2 * free, "{free} {braced}");
+fn trousers_of_someone_who_squats_come_down_again_and_hardly_pass_through_themselves() {
+    // Contact of vertices and faces only left more than 200 crossings in the mean.
+    let (reports, crossed, [before, after]) = bend("trousers", &[("hip", -1.3), ("knee", 1.7)]);
+    let lowest = |x: &[P3]| x.iter().fold(f32::MAX, |l, p| l.min(p.y));
+    let mean = crossed[..CALLS].iter().sum::<usize>() / CALLS;
+    let p99 = reports.iter().map(|r| r.p99_strain).fold(0.0, f64::max);
+    println!(
+        "{mean} crossings, p99 stretch {p99}, hem {} m up",
+        lowest(&after) - lowest(&before)
+    );
+    assert!(lowest(&after) - lowest(&before) < 0.05);
+    assert!(p99 < 0.3, "{p99}");
+    assert!(mean < 20, "{mean}");
 }
 
 #[test]
-fn what_a_deep_squat_pushed_through_itself_is_ironed_out() {
-    // Thighs on the belly, 126°. Without ironing 608, 189 and 187 crossings were left for good.
+fn what_a_deep_squat_pushed_through_itself_comes_free() {
+    // Thighs on the belly, 126°. Contact of vertices and faces only left 608, 189 and 187 crossings for good.
     let left = ["skirt", "shorts", "trousers"].map(|garment| {
-        let (_, crossed, _) = bend(
-            garment,
-            &[("hip", -2.2), ("knee", 2.2)],
-            Config::default().min_fold_ratio,
-        );
+        let (_, crossed, _) = bend(garment, &[("hip", -2.2), ("knee", 2.2)]);
         let (most, left) = (
             crossed.iter().max().expect("calls"),
             crossed[crossed.len() - 1],
@@ -133,7 +107,7 @@ fn what_a_deep_squat_pushed_through_itself_is_ironed_out() {
         println!("{garment}: {most} crossings at most, {left} after a second of standing");
         left
     });
-    assert!(left.iter().sum::<usize>() < 300, "{left:?}");
+    assert!(left.iter().sum::<usize>() < 100, "{left:?}");
 }
 
 #[test]

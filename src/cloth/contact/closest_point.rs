@@ -124,15 +124,8 @@ impl SurfaceModel {
     ) -> Option<(f32, u32, [f32; 2])> {
         let mut best: Option<(f32, u32, [f32; 2])> = None;
         for some in faces.chunks(LANES) {
-            let mut fan = TriangleFan::default();
-            for (l, f) in some.iter().enumerate() {
-                let [a, b, c] = self.faces[*f as usize].map(|i| frame.vertices[i as usize]);
-                for d in 0..3 {
-                    (fan.ab[d][l], fan.ac[d][l], fan.ap[d][l]) =
-                        (b[d] - a[d], c[d] - a[d], p[d] - a[d]);
-                }
-            }
-            let (weights, square) = fan.closest();
+            let corners = |f: &u32| self.faces[*f as usize].map(|i| frame.vertices[i as usize]);
+            let (weights, square) = TriangleFan::new(p, some.iter().map(corners)).closest();
             for (l, f) in some.iter().enumerate() {
                 if best.is_none_or(|o| square[l] < o.0) {
                     best = Some((square[l], *f, [weights[0][l], weights[1][l]]));
@@ -187,8 +180,13 @@ impl SurfaceModel {
 
     /// The point lies on the border of an open surface, where inside and outside are undefined.
     pub fn is_on_border(&self, c: &ClosestPoint) -> bool {
-        let f = self.faces[c.face as usize];
-        (0..3).all(|k| c.weights[k] < self.settings.min_weight || self.border[f[k] as usize])
+        self.is_border_point(c.face, c.weights)
+    }
+
+    /// The same for a point of a face by its barycentric weights.
+    pub fn is_border_point(&self, face: u32, weights: [f32; 3]) -> bool {
+        let f = self.faces[face as usize];
+        (0..3).all(|k| weights[k] < self.settings.min_weight || self.border[f[k] as usize])
     }
 
     /// Constraint that keeps `p` below an open surface worn over it, from the closest point `hit`.

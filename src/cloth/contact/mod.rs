@@ -47,3 +47,4 @@ pub use potential::{
 };
 pub use skin_grid::{SkinCandidates, SkinGrid};
 pub use surface::{Part, SurfaceFrame, SurfaceModel};
+pub(crate) use triangle_fan::{LANES, TriangleFan};

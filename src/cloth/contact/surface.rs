@@ -81,6 +81,10 @@ impl SurfaceModel {
     pub fn neighbours(&self, vertex: u32) -> &[u32] {
         self.topology.vertex_neighbours().row(vertex as usize)
     }
+    /// Faces around a vertex.
+    pub fn faces_around(&self, vertex: u32) -> &[u32] {
+        self.topology.vertex_faces().row(vertex as usize)
+    }
     /// Vertices within two edges of each vertex, itself included.
     pub fn second_neighbours(&self) -> Csr {
         let mut pairs = Vec::new();

@@ -1,21 +1,34 @@
 //! Closest points of eight triangles to one query at once (Ericson, Real-Time Collision Detection, 5.1.5).
 
+use tryon_geometry::math::P3;
+
 /// Triangles of a fan: the lanes of a wide register.
-pub(super) const LANES: usize = 8;
+pub(crate) const LANES: usize = 8;
 
 /// Triangles a b c and a query p: coordinates of b − a, c − a and p − a, metres; shape `[axis][lane]`.
 #[derive(Default)]
-pub(super) struct TriangleFan {
+pub(crate) struct TriangleFan {
     pub(super) ab: [[f32; LANES]; 3],
     pub(super) ac: [[f32; LANES]; 3],
     pub(super) ap: [[f32; LANES]; 3],
 }
 
 impl TriangleFan {
+    /// The first [`LANES`] of some triangles, and a query.
+    pub(crate) fn new(p: &P3, triangles: impl Iterator<Item = [P3; 3]>) -> Self {
+        let mut fan = Self::default();
+        for (l, [a, b, c]) in triangles.take(LANES).enumerate() {
+            for d in 0..3 {
+                (fan.ab[d][l], fan.ac[d][l], fan.ap[d][l]) =
+                    (b[d] - a[d], c[d] - a[d], p[d] - a[d]);
+            }
+        }
+        fan
+    }
     /// Barycentric weights of b and c at the closest points, and squared distances (m²).
     ///
     /// All Voronoi regions are computed and one is selected, so that the lanes do not branch.
-    pub(super) fn closest(&self) -> ([[f32; LANES]; 2], [f32; LANES]) {
+    pub(crate) fn closest(&self) -> ([[f32; LANES]; 2], [f32; LANES]) {
         let (mut weights, mut square) = ([[0.0; LANES]; 2], [0.0; LANES]);
         for l in 0..LANES {
             let (ab, ac, ap) = (
@@ -56,7 +69,6 @@ impl TriangleFan {
 mod tests {
     use super::*;
     use rand::{Rng, SeedableRng};
-    use tryon_geometry::math::P3;
     use tryon_geometry::spatial::closest_on_triangle;
 
     #[test]

@@ -2,10 +2,8 @@
 
 use super::contact::anchor::pin_anchors;
 use super::contact::body_contact::BodyContacts;
-use super::contact::cloth_contact::{ClothContacts, gather_sheets};
 use super::outfit_model::Model;
 use super::patch::for_patches;
-use super::solver::explicit::{Exemptions, FoldActivation, FoldLimit};
 use super::state::State;
 use super::workspace::Workspace;
 use crate::contact::SurfaceFrame;
@@ -23,7 +21,7 @@ pub(super) struct CollideInterval {
     pub(super) fastest: f32,
 }
 
-/// Generates anchors, fold limits and contact planes at the beginning of an interval.
+/// Generates anchors, contact planes and near pairs of cloth at the beginning of an interval.
 pub(super) fn collide(
     model: &Model,
     state: &State,
@@ -37,7 +35,7 @@ pub(super) fn collide(
         patches,
         chunks,
         body,
-        sheets,
+        pairs,
         ..
     } = work;
     let (par, after) = (model.config.par, state.body.frame());
@@ -53,15 +51,9 @@ pub(super) fn collide(
         fastest: interval.fastest,
         span,
         frames: state.frames,
-        layer_heights: &work.layer_heights,
         garments: &state.garments,
+        follows_planes: index % 2 == 1,
         maps: (index == 0).then_some(&work.maps),
-    };
-    gather_sheets(model, patches, span, sheets);
-    let cloth = ClothContacts {
-        model,
-        sheets,
-        span,
     };
     for_patches(model, patches, |g, k, p| {
         pin_anchors(model, g, k, &contacts, p);
@@ -71,22 +63,15 @@ pub(super) fn collide(
             .find_overstretched(patch, settings.overstretched, &mut p.overstretched);
         p.motion
             .find_overstretched(patch, settings.taut, &mut p.taut);
-        let activation = FoldActivation {
-            ratio: model.config.min_fold_ratio as f32,
-            span,
-            settings: &settings.folds,
-            except: Exemptions {
-                fixed: &p.pinned,
-                unlimited: &p.taut,
-            },
-        };
-        FoldLimit::find_active(patch, &p.motion, &activation, &mut p.fold_limits);
     });
     let patches = &*patches;
+    if index == 0 {
+        pairs.begin(model, state, patches, interval.dt);
+    }
+    pairs.query(model, patches, span);
     par::for_chunks(par, chunks, 1, |_, c| {
         let c = &mut c[0];
         contacts.generate(&patches[c.at], c);
-        cloth.generate(&patches[c.at], c);
     });
 }
 

@@ -98,11 +98,6 @@ fn commit_garment<'a>(
             g.positions[v] = p.position(i);
             g.velocities[v] = p.velocity(i);
             g.nearest[v] = c.nearest[j];
-            for (to, from) in g.layers.iter_mut().zip(&c.layers) {
-                if let (Some(to), Some(from)) = (to.get_mut(v), from.get(j)) {
-                    *to = *from;
-                }
-            }
             // Displacement, not velocity: a vertex between contradicting planes has one and stays.
             let moved = p.motion.displacement[i];
             squares.push(moved.dot(moved));

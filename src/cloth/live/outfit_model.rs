@@ -157,11 +157,6 @@ impl Config {
                 "offset, teleport, steady, untangle",
                 "they must be finite, teleport positive, steady and untangle not negative",
             ),
-            (
-                !(0.0..1.0).contains(&self.min_fold_ratio),
-                "sharpest",
-                "must be at least 0 and less than 1",
-            ),
         ];
         let fault = faults.into_iter().find(|f| f.0);
         fault.map_or(Ok(()), |(_, field, why)| Err(ClothError::field(field, why)))

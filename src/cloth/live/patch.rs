@@ -1,7 +1,7 @@
 //! Scratch of one patch of one garment during a step.
 
 use super::outfit_model::Model;
-use super::solver::explicit::{ContactPlane, FoldLimit, PatchState, Pin, V4};
+use super::solver::explicit::{ContactPlane, PatchState, Pin, V4, VertexPlanes};
 use super::state::State;
 use tryon_geometry::math::{P3, V3};
 use tryon_geometry::par;
@@ -11,7 +11,7 @@ use tryon_geometry::par;
 pub(super) struct PatchWork {
     pub(super) motion: PatchState,
     pub(super) asleep: Vec<bool>,
-    /// Taut: exempt from fold and speed limits.
+    /// Taut: exempt from speed limits.
     pub(super) taut: Vec<bool>,
     /// Stretched beyond the ratio at which contact constraints are released.
     pub(super) overstretched: Vec<bool>,
@@ -19,11 +19,10 @@ pub(super) struct PatchWork {
     pub(super) pinned: Vec<bool>,
     /// Anchors of the current interval.
     pub(super) pins: Vec<Pin>,
-    /// Active fold limits of the current interval.
-    pub(super) fold_limits: Vec<FoldLimit>,
-    /// Contact planes within reach for some substeps: `body_planes` of the body, then those of cloth.
-    pub(super) planes: Vec<ContactPlane>,
-    pub(super) body_planes: usize,
+    /// Contact planes of cloth in the current block.
+    pub(super) cloth_planes: Vec<ContactPlane>,
+    /// Contact planes within reach for some substeps.
+    pub(super) planes: VertexPlanes,
     /// Vertices in contact with the body.
     pub(super) contacts: usize,
 }
@@ -43,6 +42,24 @@ impl PatchWork {
     pub(super) fn velocity(&self, i: usize) -> V3 {
         let v = self.motion.velocity[i].0;
         V3::new(v[0], v[1], v[2])
+    }
+    /// Position `to` for vertex `i`, moved back where it passes contact planes of cloth farther than the vertex does now,
+    /// `t` seconds after their query; metres.
+    pub(super) fn held_by_cloth(&self, i: usize, mut to: V4, t: f32) -> V4 {
+        /// Passes over planes that meet at an angle.
+        const PASSES: usize = 2;
+        let at = self.motion.position(i);
+        let first = self
+            .cloth_planes
+            .partition_point(|p| (p.vertex as usize) < i);
+        let own = |p: &&ContactPlane| p.vertex as usize == i;
+        for _ in 0..PASSES {
+            for p in self.cloth_planes[first..].iter().take_while(own) {
+                let lacking = p.gap(at, t).min(0.0) - p.gap(to, t);
+                to = to + p.normal.scale(lacking.max(0.0));
+            }
+        }
+        to
     }
 }
 

@@ -25,10 +25,7 @@ pub struct StepReport {
     pub sleeping: usize,
     /// Skin queries skipped because the vertex was too far away to reach it.
     pub searches_skipped: usize,
-    /// Queries for other folds of the same garment skipped for the same reason.
-    #[serde(default)]
-    pub fold_searches_skipped: usize,
-    /// Vertices in contact with another layer or fold.
+    /// Near pairs of vertices and faces, or edges, of cloth and cloth.
     pub cloth_contacts: usize,
     /// Vertices between two body parts with less clearance than two layers need.
     pub pinched: usize,
@@ -37,9 +34,6 @@ pub struct StepReport {
     /// Intersections (edge, triangle) of the garments queried in this step.
     #[serde(default)]
     pub crossings: usize,
-    /// Rings of sleeves that had lost their arm and were put around it again.
-    #[serde(default)]
-    pub sleeves_put_back: usize,
     /// The body teleported and the cloth was reskinned.
     pub teleported: bool,
     /// Fault that made a garment keep its last good state.

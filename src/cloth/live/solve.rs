@@ -1,16 +1,16 @@
 //! Solve stage: explicit substeps of all patches through one interval.
 
 use super::contact::chunk::ContactChunk;
+use super::contact::pair_contact::{Block, PairContacts};
 use super::garment_model::GarmentModel;
 use super::outfit_model::Model;
-use super::patch::PatchWork;
-use super::solver::explicit::{
-    ContactPlane, Exemptions, FoldLimit, PatchState, Recovery, Substep, V4, run_substeps,
-};
+use super::patch::{PatchWork, for_patches};
+use super::solver::explicit::{Exemptions, Recovery, Substep, V4, run_substeps};
+use std::ops::Range;
 use tryon_geometry::par;
 
 /// Evaluations of bending between two selections of the contact planes within reach.
-const PLANE_INTERVAL: usize = 2;
+const PLANE_INTERVAL: usize = 1;
 
 /// One interval of a step.
 #[derive(Clone, Copy)]
@@ -26,12 +26,40 @@ pub(super) fn substeps(m: &GarmentModel, span: f64) -> usize {
     (span / m.h).ceil().max(1.0) as usize
 }
 
-/// Advances all patches through an interval. Garments are independent, patches of one garment exchange halos.
+/// Contacts of an interval.
+pub(super) struct SolveContacts<'a> {
+    pub(super) chunks: &'a [ContactChunk],
+    pub(super) pairs: &'a mut PairContacts,
+}
+
+/// Advances all patches through an interval, block by block. Garments are independent within a block, patches of one
+/// garment exchange halos.
 pub(super) fn solve(
     model: &Model,
     all: &mut [PatchWork],
-    chunks: &[ContactChunk],
+    contacts: SolveContacts<'_>,
     interval: Interval,
+) {
+    let SolveContacts { chunks, pairs } = contacts;
+    let blocks = Block::count(interval.span, &model.config.contact.pairs);
+    let span = (interval.span / blocks as f64) as f32;
+    for index in 0..blocks {
+        if index > 0 {
+            pairs.advance(model, all, span);
+        }
+        let t = index as f32 * span;
+        pairs.lay(model, all, chunks, Block { t, span });
+        for_patches(model, all, |g, k, p| pairs.planes(model, g, k, p));
+        solve_block(model, all, chunks, (interval, [index, blocks]));
+    }
+}
+
+/// Advances all patches through one of some equal blocks.
+fn solve_block(
+    model: &Model,
+    all: &mut [PatchWork],
+    chunks: &[ContactChunk],
+    (interval, [index, blocks]): (Interval, [usize; 2]),
 ) {
     let mut rest = all;
     let mut garments = Vec::with_capacity(model.garments.len());
@@ -49,11 +77,11 @@ pub(super) fn solve(
             garment: g,
             chunks,
             interval,
-            substeps: n,
+            range: n * index / blocks..n * (index + 1) / blocks,
             h: (interval.span / n as f64) as f32,
         };
         let par = model.config.par;
-        run_substeps(par, &m.patches, patches, n, |s, k, p| {
+        run_substeps(par, &m.patches, patches, solver.range.len(), |s, k, p| {
             solver.substep(s, k, p)
         });
     });
@@ -66,21 +94,22 @@ struct GarmentSolver<'a> {
     garment: usize,
     chunks: &'a [ContactChunk],
     interval: Interval,
-    substeps: usize,
+    /// Substeps of the block among those of the interval.
+    range: Range<usize>,
     /// Substep, s.
     h: f32,
 }
 
 impl GarmentSolver<'_> {
-    /// Substep `s` of patch `k`.
+    /// Substep `s` of the block in patch `k`.
     fn substep(&self, s: usize, k: usize, p: &mut PatchWork) {
         let (f, h, every) = (&self.m.patches[k], self.h, self.m.bending_interval);
-        let t = s as f32 * h;
+        let t = (self.range.start + s) as f32 * h;
         if s.is_multiple_of(PLANE_INTERVAL * every) {
             self.select_planes(s, k, p);
         }
         if s.is_multiple_of(every) {
-            let lookahead = h * every.min(self.substeps - s) as f32 * 0.5;
+            let lookahead = h * every.min(self.range.len() - s) as f32 * 0.5;
             p.motion.update_bending(f, lookahead, self.m.filter_degree);
         }
         let [x, y, z] = self.model.config.gravity.map(|g| g as f32);
@@ -94,16 +123,11 @@ impl GarmentSolver<'_> {
         p.motion.integrate_velocities(f, &step, &p.planes, &p.pins);
         p.motion.apply_pins(&p.pins, t, h);
         let settings = &self.model.config.solver;
-        FoldLimit::apply(&p.fold_limits, &mut p.motion, h, &settings.folds);
-        // The body has the last word.
-        let (body, cloth) = p.planes.split_at(p.body_planes);
-        let recovery = |speed| Recovery {
+        let recovery = [settings.cloth_recovery, settings.body_recovery].map(|speed| Recovery {
             share: settings.recovered,
             speed,
-        };
-        p.motion
-            .resolve_contacts(cloth, t, h, recovery(settings.cloth_recovery));
-        p.contacts = (p.motion).resolve_contacts(body, t, h, recovery(settings.body_recovery));
+        });
+        p.contacts = p.motion.resolve_contacts(&p.planes, [t, h], recovery);
         if let Some(limit) = self.interval.speed_limit {
             let exempt = Exemptions {
                 fixed: &p.pinned,
@@ -117,21 +141,16 @@ impl GarmentSolver<'_> {
 
     /// Selects the planes that vertices can reach until the next selection.
     fn select_planes(&self, s: usize, k: usize, p: &mut PatchWork) {
-        let steps = (PLANE_INTERVAL * self.m.bending_interval).min(self.substeps - s);
-        let (t, span) = (s as f32 * self.h, steps as f32 * self.h);
+        let steps = (PLANE_INTERVAL * self.m.bending_interval).min(self.range.len() - s);
+        let t = (self.range.start + s) as f32 * self.h;
+        let span = steps as f32 * self.h;
         let gain = self.model.config.solver.speed_gain;
-        let reach = |motion: &PatchState, planes: &[ContactPlane], out: &mut Vec<_>| {
-            motion.find_reachable(planes, [t, span], gain, out);
-        };
         let is_own = |c: &&ContactChunk| (c.garment, c.patch) == (self.garment, k);
-        let (motion, planes) = (&p.motion, &mut p.planes);
-        planes.clear();
-        for c in self.chunks.iter().filter(is_own) {
-            reach(motion, &c.body_planes, planes);
-        }
-        p.body_planes = planes.len();
-        for c in self.chunks.iter().filter(is_own) {
-            reach(motion, &c.cloth_planes, planes);
-        }
+        let body = self
+            .chunks
+            .iter()
+            .filter(is_own)
+            .flat_map(|c| &c.body_planes);
+        (p.planes).select(&p.motion, &p.cloth_planes, body, [t, span, gain]);
     }
 }

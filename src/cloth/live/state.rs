@@ -3,7 +3,7 @@
 use super::error::ClothError;
 use super::outfit_model::Model;
 use super::sleep::SleepState;
-use crate::contact::{CollisionBody, SurfaceFrame};
+use crate::contact::CollisionBody;
 use serde::{Deserialize, Serialize};
 use tryon_geometry::math::{P3, V3};
 
@@ -16,14 +16,9 @@ pub struct GarmentState {
     pub velocities: Vec<V3>,
     /// Nearest body vertex of each vertex, among its own parts and among the others.
     pub(super) nearest: Vec<[u32; 2]>,
-    /// Nearest vertex of every garment further out, shape `[garments][vertices]`; empty for the others.
-    pub(super) layers: Vec<Vec<u32>>,
     /// Vertices that intersected cloth at the last query, in ascending order.
     #[serde(default, rename = "passing")]
     pub(super) intersecting: Vec<u32>,
-    /// Intersection counter per vertex, up on each query that finds one, down otherwise; empty before the first query.
-    #[serde(default, rename = "stuck")]
-    pub(super) intersection_count: Vec<u8>,
 }
 
 /// State of an outfit.
@@ -71,7 +66,6 @@ impl State {
             }
             garments.push(GarmentState::at_rest(model, k, p, &body));
         }
-        find_outer_layers(model, &mut garments);
         Ok(Self {
             garments,
             sleep: SleepState::new(body.vertices()),
@@ -102,26 +96,6 @@ impl GarmentState {
             velocities: vec![V3::zeros(); positions.len()],
             positions,
             ..Self::default()
-        }
-    }
-}
-
-/// Fills the nearest vertices of the garments further out.
-fn find_outer_layers(model: &Model, garments: &mut [GarmentState]) {
-    let frames: Vec<SurfaceFrame> = garments
-        .iter()
-        .map(|g| SurfaceFrame::without_normals(g.positions.clone()))
-        .collect();
-    for (k, g) in garments.iter_mut().enumerate() {
-        for (j, frame) in frames.iter().enumerate() {
-            let (outer, own) = (&model.garments[j].self_contact, &model.garments[k].own);
-            let near = if j > k {
-                let surface = &outer.surface;
-                surface.nearest_vertices(model.config.par, frame, &g.positions, own.iter())
-            } else {
-                Vec::new()
-            };
-            g.layers.push(near);
         }
     }
 }

@@ -7,14 +7,13 @@ use super::contact::skin_projection::SkinProjection;
 use super::error::ClothError;
 use super::outfit_model::Model;
 use super::patch::{begin, for_patches};
-use super::repair::recover_sleeves::recover_sleeves;
 use super::repair::teleport::Teleport;
 use super::report::StepReport;
 use super::sleep::{
     BodyStep, follow_asleep, follow_sleeping, is_body_still, put_islands_to_sleep,
     update_stillness, wake_islands,
 };
-use super::solve::{Interval, solve, substeps};
+use super::solve::{Interval, SolveContacts, solve, substeps};
 use super::state::State;
 use super::workspace::Workspace;
 use crate::contact::MapView;
@@ -157,7 +156,7 @@ impl<'a> AwakeStep<'a> {
         }
     }
 
-    /// Reskins cloth of a body that teleported, wakes islands, and recovers sleeves.
+    /// Reskins cloth of a body that teleported, and wakes islands.
     fn repair(&mut self, report: &mut StepReport) {
         let Self {
             model, state, work, ..
@@ -189,7 +188,6 @@ impl<'a> AwakeStep<'a> {
             surface.update_normals(model.config.par, before);
         }
         report.teleported = self.teleported;
-        report.sleeves_put_back = recover_sleeves(model, state, before);
     }
 
     /// Renders depth maps, untangles garments, completes the collision body, and splits the patches into chunks.
@@ -230,7 +228,6 @@ impl<'a> AwakeStep<'a> {
         state.body = body;
         begin(model, state, &mut work.patches);
         split(model, state, &mut work.chunks);
-        work.layer_heights.measure(model, state, &work.body.before);
     }
 
     /// Views of the depth maps in turn, all of them after a teleport: maps only seed the contact queries.
@@ -265,7 +262,11 @@ impl<'a> AwakeStep<'a> {
             speed_limit: settings.speed_limit_after(still_time).filter(|_| sleep),
         };
         let work = &mut *self.work;
-        solve(self.model, &mut work.patches, &work.chunks, interval);
+        let contacts = SolveContacts {
+            chunks: &work.chunks,
+            pairs: &mut work.pairs,
+        };
+        solve(self.model, &mut work.patches, contacts, interval);
     }
 
     /// Projects cloth that is below the skin at the end of the step.
@@ -275,6 +276,7 @@ impl<'a> AwakeStep<'a> {
             model: self.model,
             body: &self.state.body,
             grid: &work.skin_grid,
+            since_query: self.span as f32,
         };
         let patches = &work.patches;
         par::for_chunks(self.model.config.par, &mut work.chunks, 1, |_, c| {
@@ -301,6 +303,7 @@ impl<'a> AwakeStep<'a> {
         let dt = *dt;
         for_patches(model, &mut work.patches, |_, _, p| follow_sleeping(p, dt));
         let speed = commit(model, state, work, dt, report);
+        report.cloth_contacts = work.pairs.len();
         let steps = |g| self.intervals * substeps(g, self.span);
         report.steps = model.garments.iter().map(steps).max().unwrap_or(0);
         report.speed = f64::from(speed);

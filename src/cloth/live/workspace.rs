@@ -1,8 +1,7 @@
 //! Scratch of a step.
 
 use super::contact::chunk::ContactChunk;
-use super::contact::layer_height::LayerHeights;
-use super::contact::self_contact::SelfContactFrame;
+use super::contact::pair_contact::PairContacts;
 use super::patch::PatchWork;
 use super::repair::untangle::UntangleWork;
 use crate::contact::{CollisionWorkspace, DepthMaps, SkinGrid, SurfaceFrame};
@@ -16,9 +15,7 @@ pub struct Workspace {
     pub(super) collision: CollisionWorkspace,
     /// Body vertices at the end of the step.
     pub(super) skin_grid: SkinGrid,
-    /// Garments at the beginning of an interval, for contact of cloth with cloth.
-    pub(super) sheets: Vec<SelfContactFrame>,
-    pub(super) layer_heights: LayerHeights,
+    pub(super) pairs: PairContacts,
     pub(super) maps: DepthMaps,
     pub(super) untangle: UntangleWork,
 }

@@ -18,10 +18,12 @@ pub use fine::{
     ContactSettings, DrapeSettings, NewtonSettings, ObstacleSpring, OfflineSettings,
     OfflineStartSettings, SleepSettings, TimeScheme,
 };
-pub use live::{ClothContactSettings, Config, LiveStepSettings, SelfContactSettings};
+pub use live::{
+    ClothContactSettings, Config, LiveStepSettings, NearPairSettings, SelfContactSettings,
+};
 pub use repair::{ClothRepairSettings, SleeveSettings, UntanglerSettings};
 pub use scene::SceneSettings;
-pub use solver::{FoldSettings, SolverSettings};
+pub use solver::SolverSettings;
 pub use stillness::StillnessSettings;
 
 use tryon_geometry::settings;

@@ -5,11 +5,8 @@ use super::settings;
 settings! {
     /// Settings of the repair of worn garments.
     pub struct ClothRepairSettings {
-        /// Largest displacement of an untangling query, metres. With 5 mm armpits without clearance for two layers stretch by
-        /// 18 %.
-        pub max_displacement: f64 = 0.003,
-        /// Largest displacement of smoothed vertices, metres.
-        pub max_smoothing: f64 = 0.015,
+        /// Largest displacement of an untangling query, metres. With 3 mm sleeves and hoods have three times the crossings.
+        pub max_displacement: f64 = 0.006,
         /// Height above the skin below which nothing is moved, metres: less than a fabric's thickness.
         pub min_height: f64 = 5e-4,
         /// Distance beyond which skin does not constrain the displacement, metres.

@@ -32,33 +32,19 @@ settings! {
         pub eigenvalue_margin: f64 = 1.03,
         /// Quantile of the vertices' stiffness over mass that normalises the filter's weights. Larger lets slivers weaken it.
         pub usual_quantile: f64 = 0.9,
-        /// Stretch ratio above which cloth is exempt from fold and speed limits: held open in an armpit, sleeves tear (p99 0.26
+        /// Stretch ratio above which cloth is exempt from speed limits: held open in an armpit, sleeves tear (p99 0.26
         /// instead of 0.16).
         pub taut: f32 = 1.15,
         /// Stretch ratio above which contact constraints are released: more than knitwear is worn at.
         pub overstretched: f32 = 1.5,
         /// Speed that a vertex may gain towards a surface between two searches for reachable planes (m/s): over 1.7 ms 120
         /// times gravity. Smaller misses contacts; larger keeps planes out of reach.
-        pub speed_gain: f32 = 2.0,
+        pub speed_gain: f32 = 1.0,
         /// Share of a penetration that one substep removes. Larger jitters; smaller leaves cloth inside for longer.
         pub recovered: f32 = 0.2,
         /// Speed at which cloth below the skin comes out, m/s; faster, a body that closes on itself throws it.
         pub body_recovery: f32 = 1.0,
         /// The same for cloth on the wrong side of cloth, where the body may be in the way.
         pub cloth_recovery: f32 = 0.3,
-        /// Limits of folds.
-        pub folds: FoldSettings = FoldSettings::default(),
-    }
-
-    /// Settings of the limits of folds.
-    pub struct FoldSettings {
-        /// Closing speed that two vertices may gain until the next search for active limits (m/s). Smaller misses some.
-        pub speed_gain: f32 = 0.3,
-        /// Share of a violation that one substep removes. Larger jitters.
-        pub recovered: f32 = 0.2,
-        /// Largest opening speed of a violated limit (m/s).
-        pub recovery_speed: f32 = 1.0,
-        /// Largest minimal distance (m): folds of 3 cm triangles would not fit under an arm with more.
-        pub widest: f32 = 0.02,
     }
 }

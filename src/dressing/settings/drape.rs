@@ -63,6 +63,16 @@ settings! {
         pub attempts: usize = 4,
     }
 
+    /// Settings of coming to rest in the simulator.
+    pub struct SettlingSettings {
+        /// Fewest and most steps; further ones only untangle.
+        pub steps: [usize; 2] = [12, 60],
+        /// Length of a step, s.
+        pub step: f64 = 1.0 / 60.0,
+        /// Largest speed, m/s: a drape starts with forces of thousands of its weights.
+        pub max_speed: f32 = 0.3,
+    }
+
     /// Settings of the contact with skin and outer garments.
     pub struct DrapeContactSettings {
         /// Distance beyond which a plane is ignored (m).

@@ -8,7 +8,7 @@ mod sections;
 
 pub use drape::{
     DrapeContactSettings, FollowSettings, HeldDownSettings, HoodDrapeSettings, OutfitDrapeSettings,
-    ScheduleSettings, UntangleSettings,
+    ScheduleSettings, SettlingSettings, UntangleSettings,
 };
 pub use fit::{FitMapSettings, WornSizeSettings};
 pub use mesh_garment::{
@@ -34,6 +34,8 @@ settings! {
         pub place: PlaceSettings = PlaceSettings::default(),
         /// Drape.
         pub drape: OutfitDrapeSettings = OutfitDrapeSettings::default(),
+        /// Coming to rest in the simulator.
+        pub settling: SettlingSettings = SettlingSettings::default(),
         /// Sizes that patterns are worn in.
         pub size: WornSizeSettings = WornSizeSettings::default(),
     }

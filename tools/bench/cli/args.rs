@@ -1,6 +1,7 @@
 //! Commands and flags of `tryon-bench`.
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
+use std::num::NonZeroUsize;
 use std::path::PathBuf;
 use tryon_bench::OutfitSpec;
 use tryon_bench::people::PeoplePlan;
@@ -182,6 +183,9 @@ pub(crate) struct WornArgs {
     /// Edge length of the triangles (m), as worn without it.
     #[arg(long, value_name = "M")]
     pub(crate) edge: Option<f64>,
+    /// Writes the cloth of every Nth picture below --out, for judges made by others: meshes/*.obj, and meshes/crossings.json.
+    #[arg(long, value_name = "N")]
+    pub(crate) meshes: Option<NonZeroUsize>,
     /// Settings of the simulation as JSON; by default those of a tracked body.
     #[arg(long, value_name = "JSON", default_value = r#"{"steady":0.008}"#)]
     pub(crate) set: String,

@@ -5,7 +5,8 @@ use crate::args::{
 };
 use crate::progress::progress;
 use anyhow::Result;
-use std::path::Path;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use tryon::garment::{Triangulation, library};
 use tryon::geometry::par::with_threads;
@@ -16,8 +17,8 @@ use tryon_bench::garment_capture::{
 };
 use tryon_bench::people;
 use tryon_bench::rest::measure_rest;
-use tryon_bench::worn::Wearer;
-use tryon_bench::{OutfitSpec, Table, cloth};
+use tryon_bench::worn::{Wearer, WornPicture};
+use tryon_bench::{EvaluateError, OutfitSpec, Table, cloth};
 
 /// Frames of the dress without --frames.
 const DRESS_FRAMES: usize = 4;
@@ -128,18 +129,62 @@ pub(crate) fn worn(args: &WornArgs) -> Result<ExitCode> {
         "measuring",
     );
     let mut table = Table::new("worn", "one step of 1/30 s, mean");
+    let mut meshes = args
+        .meshes
+        .map(|every| MeshFolder::new(&args.out, every.get()))
+        .transpose()?;
     with_threads(args.threads, || -> Result<()> {
         for motion in &args.motion {
             let wearer = Wearer::new(*motion, &args.data)?;
             for outfit in &outfits {
-                table.rows.push(wearer.row(outfit, &wearer.wear(outfit)?));
+                let scene = wearer.scene(outfit);
+                let report = wearer.wear(outfit, |picture| match &mut meshes {
+                    Some(folder) => folder.add(&scene, picture),
+                    None => Ok(()),
+                })?;
+                table.rows.push(wearer.row(outfit, &report));
                 bar.inc(1);
             }
         }
         Ok(())
     })??;
     bar.finish_and_clear();
+    if let Some(folder) = &meshes {
+        folder.finish()?;
+    }
     finish(&table, &args.out)
+}
+
+/// Folder of cloth as meshes, with the crossings that this project finds in each.
+struct MeshFolder {
+    folder: PathBuf,
+    every: usize,
+    crossings: BTreeMap<String, [usize; 2]>,
+}
+
+impl MeshFolder {
+    fn new(out: &Path, every: usize) -> Result<Self> {
+        let folder = out.join("meshes");
+        std::fs::create_dir_all(&folder)?;
+        Ok(Self {
+            folder,
+            every,
+            crossings: BTreeMap::new(),
+        })
+    }
+    fn add(&mut self, scene: &str, picture: &WornPicture<'_>) -> Result<(), EvaluateError> {
+        if !picture.number.is_multiple_of(self.every) {
+            return Ok(());
+        }
+        let name = format!("{scene}_{:04}.obj", picture.number);
+        picture.write(&self.folder.join(&name))?;
+        self.crossings.insert(name, picture.crossings);
+        Ok(())
+    }
+    fn finish(&self) -> Result<()> {
+        let text = serde_json::to_string_pretty(&self.crossings)?;
+        Ok(std::fs::write(self.folder.join("crossings.json"), text)?)
+    }
 }
 
 /// Runs `tryon-bench people`.

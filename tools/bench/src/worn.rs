@@ -7,6 +7,7 @@ use std::time::Instant;
 use tryon_body::measure;
 use tryon_cloth::{Input, State, Workspace, step};
 use tryon_dressing::{Dressed, suggest};
+use tryon_formats::obj::write_obj;
 use tryon_geometry::math::P3;
 use tryon_geometry::math::order_statistics::percentile;
 use tryon_geometry::spatial::intersections;
@@ -71,11 +72,15 @@ impl Wearer {
         Ok(Self { motion, film })
     }
 
-    /// Wears an outfit in the suggested sizes through the motion.
+    /// Wears an outfit in the suggested sizes through the motion, and shows each picture.
     ///
     /// # Errors
-    /// A garment that is not known, or cannot be put on or simulated.
-    pub fn wear(&self, outfit: &OutfitSpec) -> Result<WornReport, EvaluateError> {
+    /// A garment that is not known, or cannot be put on or simulated; what `show` returns.
+    pub fn wear(
+        &self,
+        outfit: &OutfitSpec,
+        mut show: impl FnMut(&WornPicture<'_>) -> Result<(), EvaluateError>,
+    ) -> Result<WornReport, EvaluateError> {
         let BodyFilm {
             template,
             rest,
@@ -106,7 +111,16 @@ impl Wearer {
             report.stages_ms[1] += r.stages_ms.solve;
             report.strain.push(r.p99_strain);
             report.faults += usize::from(r.kept_last_good.is_some());
-            report.crossings.push(cloth.crossings(&state));
+            let garments = state.garments.iter();
+            let positions: Vec<P3> = garments.flat_map(|g| g.positions.clone()).collect();
+            let crossings = cloth.crossings(&positions);
+            report.crossings.push(crossings);
+            show(&WornPicture {
+                number: i,
+                faces: &cloth.faces,
+                positions: &positions,
+                crossings,
+            })?;
             if i + AT_REST >= bodies.len() {
                 let speeds = state.garments.iter().flat_map(|g| &g.velocities);
                 report.speeds.extend(speeds.map(|v| f64::from(v.norm())));
@@ -115,11 +129,41 @@ impl Wearer {
         Ok(report)
     }
 
+    /// Name of a scene: motion and garments.
+    pub fn scene(&self, outfit: &OutfitSpec) -> String {
+        let motion = self.motion.to_possible_value();
+        let name = motion.as_ref().map_or("", |m| m.get_name());
+        format!("{name}_{}", outfit.garments.join("+"))
+    }
+
     /// Row of an outfit's report.
     pub fn row(&self, outfit: &OutfitSpec, report: &WornReport) -> Row {
         let motion = self.motion.to_possible_value();
         let name = motion.as_ref().map_or("", |m| m.get_name());
         report.row(name, &outfit.garments.join("+"))
+    }
+}
+
+/// Cloth of one picture, vertices of all garments numbered through.
+#[derive(Clone, Copy, Debug)]
+pub struct WornPicture<'a> {
+    /// Number of the picture.
+    pub number: usize,
+    /// Faces.
+    pub faces: &'a [[u32; 3]],
+    /// World, metres.
+    pub positions: &'a [P3],
+    /// Edges through faces of their own garment and of another one.
+    pub crossings: [usize; 2],
+}
+
+impl WornPicture<'_> {
+    /// Writes the cloth as OBJ.
+    ///
+    /// # Errors
+    /// A file that cannot be written.
+    pub fn write(&self, path: &Path) -> Result<(), EvaluateError> {
+        write_obj(path, self.positions, self.faces, None).map_err(fault)
     }
 }
 
@@ -142,11 +186,9 @@ impl ClothFaces {
     }
 
     /// Edges through faces of their own garment, and of another one.
-    fn crossings(&self, state: &State) -> [usize; 2] {
-        let garments = state.garments.iter();
-        let positions: Vec<P3> = garments.flat_map(|g| g.positions.clone()).collect();
+    fn crossings(&self, positions: &[P3]) -> [usize; 2] {
         let mut found = [0; 2];
-        for i in intersections(&self.faces, &positions) {
+        for i in intersections(&self.faces, positions) {
             let [edge, face] = [i.edge[0], self.faces[i.face as usize][0]];
             found[usize::from(self.owner[edge as usize] != self.owner[face as usize])] += 1;
         }
@@ -216,7 +258,8 @@ mod tests {
                 state.garments.push(garment);
             }
             let faces: Vec<_> = garments.iter().map(|g| &g.0).collect();
-            ClothFaces::new(&faces, &state).crossings(&state)
+            let positions: Vec<P3> = garments.iter().flat_map(|g| g.1.clone()).collect();
+            ClothFaces::new(&faces, &state).crossings(&positions)
         };
         let one = (vec![[0, 1, 2], [3, 4, 5]], [level, upright].concat());
         assert_eq!(worn(&[one]), [2, 0]);

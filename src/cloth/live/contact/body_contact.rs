@@ -1,7 +1,6 @@
 //! Contact of garments with the body: half-space constraints for each vertex near skin.
 
 use super::chunk::ContactChunk;
-use super::layer_height::LayerHeights;
 use crate::contact::{ClosestPoint, DepthMaps, Interior, SearchExtent, SurfaceFrame, SurfaceModel};
 use crate::live::garment_model::GarmentModel;
 use crate::live::outfit_model::Model;
@@ -27,9 +26,10 @@ pub(in crate::live) struct BodyContacts<'a> {
     pub(in crate::live) span: f32,
     /// Steps so far.
     pub(in crate::live) frames: u64,
-    pub(in crate::live) layer_heights: &'a LayerHeights,
     /// Garments at the beginning of the step.
     pub(in crate::live) garments: &'a [GarmentState],
+    /// Planes of the last interval move on: in half the intervals cloth slides too little to meet other skin.
+    pub(in crate::live) follows_planes: bool,
     /// Depth maps, in the first interval of a step.
     pub(in crate::live) maps: Option<&'a DepthMaps>,
 }
@@ -44,9 +44,8 @@ struct VertexQuery {
     masks: [u8; 2],
     /// Largest relative motion to skin in the interval, metres.
     travel: f32,
-    /// Distance that it keeps from the skin, and the largest any vertex of the garment keeps, metres.
+    /// Distance that it keeps from the skin, metres.
     offset: f32,
-    max_offset: f32,
 }
 
 impl BodyContacts<'_> {
@@ -54,15 +53,22 @@ impl BodyContacts<'_> {
     pub(in crate::live) fn generate(&self, p: &PatchWork, c: &mut ContactChunk) {
         let (g, f) = c.model(self.model);
         let offset = g.offset as f32;
-        let max_offset = self.layer_heights.max_offset(c.garment, offset);
         if !self.model.config.cull_distant {
             c.clearance.fill([0.0; 2]);
         }
-        c.body_planes.clear();
+        let last = std::mem::take(&mut c.body_planes);
+        let mut last = last.iter().peekable();
         for (j, i) in c.range.clone().enumerate() {
+            let mut own = std::iter::from_fn(|| last.next_if(|p| p.vertex as usize <= i))
+                .filter(|p| p.vertex as usize == i)
+                .peekable();
             // Contradicting planes would tear cloth: overstretched vertices hang on their neighbours.
-            c.released[j] = p.overstretched[i];
             if p.pinned[i] || p.overstretched[i] {
+                continue;
+            }
+            if self.follows_planes && own.peek().is_some() {
+                let moved = own.map(|plane| plane.after(self.span));
+                c.body_planes.extend(moved);
                 continue;
             }
             let v = f.vertices[i];
@@ -74,7 +80,6 @@ impl BodyContacts<'_> {
                 masks: [g.own[v as usize], g.other[v as usize]],
                 travel: (speed + self.fastest) * self.span,
                 offset,
-                max_offset,
             };
             if let Some(maps) = self.maps {
                 self.seed_from_maps(maps, &query, &mut c.nearest[j]);
@@ -111,7 +116,7 @@ impl BodyContacts<'_> {
         }
         let surface = self.surface();
         let reach = self.model.config.reach as f32;
-        let wanted = (q.max_offset + reach + q.travel).min(self.model.config.contact.max_reach);
+        let wanted = (q.offset + reach + q.travel).min(self.model.config.contact.max_reach);
         let around = g.self_contact.surface.neighbours(q.v).iter();
         let nearest = &self.garments[c.garment].nearest;
         let starts = around.map(|w| nearest[*w as usize][side]);
@@ -125,21 +130,20 @@ impl BodyContacts<'_> {
         let mut hit = match hit {
             Ok(hit) => hit,
             Err(beyond) => {
-                *clearance = beyond + wanted - q.max_offset - reach;
+                *clearance = beyond + wanted - q.offset - reach;
                 return None;
             }
         };
         *clearance = if hit.on_part_boundary {
             0.0
         } else {
-            hit.signed_distance - q.max_offset - reach
+            hit.signed_distance - q.offset - reach
         };
         if hit.on_part_boundary && side == 0 {
             // Beyond its own parts: the closest skin of any part.
             hit = surface.closest(self.now, &q.x, near, Region::ALL.0);
         }
         let is_interior = self.interior.covers(surface.faces()[hit.face as usize]);
-        c.released[q.j] |= is_interior && !hit.on_part_boundary && hit.signed_distance < q.offset;
         let constrains = !is_interior && !hit.on_part_boundary && hit.signed_distance < wanted;
         constrains.then_some(hit)
     }
@@ -147,7 +151,7 @@ impl BodyContacts<'_> {
     /// Offsets from its own and from other skin.
     ///
     /// Between skins that face each other cloth keeps to its own half, so that layers do not pass each other. Where the
-    /// skins penetrate each other the vertex is released and hangs on its neighbours.
+    /// skins penetrate each other the vertex has no plane and hangs on its neighbours.
     fn share_gap(
         &self,
         q: &VertexQuery,
@@ -157,16 +161,13 @@ impl BodyContacts<'_> {
         let Some(own) = &found[0] else {
             return (found, [q.offset; 2]);
         };
-        let corners = self.surface().faces()[own.face as usize];
-        let raised = self.layer_heights.offset_over(c.garment, corners, q.offset);
         let gap = found[1].and_then(|other| own.clearance_to(&other));
         let settings = &self.model.config.contact;
         let Some(gap) = gap.filter(|gap| *gap < settings.shared_gap) else {
-            return (found, [raised, q.offset]);
+            return (found, [q.offset; 2]);
         };
         c.report.pinched += usize::from(gap < 2.0 * q.offset);
         if gap < 0.0 {
-            c.released[q.j] = true;
             return ([None, None], [q.offset; 2]);
         }
         let half = 0.5 * gap;
@@ -291,8 +292,8 @@ mod tests {
                 fastest: motion.norm() / SPAN,
                 span: SPAN,
                 frames: 0,
-                layer_heights: &LayerHeights::default(),
                 garments: &self.state.garments,
+                follows_planes: false,
                 maps: None,
             };
             for c in &mut self.chunks {
@@ -334,17 +335,15 @@ mod tests {
     }
 
     #[test]
-    fn pinned_and_overstretched_vertices_have_no_plane_and_only_the_latter_are_released() {
+    fn pinned_and_overstretched_vertices_have_no_plane() {
         let mut f = Fixture::new(0.004);
         f.patches[0].pinned.fill(true);
         f.generate(V3::zeros());
         assert!(f.chunks[0].body_planes.is_empty());
-        assert!(!f.chunks[0].released.contains(&true));
         f.patches[0].pinned.fill(false);
         f.patches[0].overstretched.fill(true);
         f.generate(V3::zeros());
         assert!(f.chunks[0].body_planes.is_empty());
-        assert!(f.chunks[0].released.iter().all(|r| *r));
     }
 
     #[test]

@@ -16,9 +16,7 @@ const VERTICES: usize = 512;
 #[derive(Clone, Copy, Debug, Default)]
 pub(in crate::live) struct ContactCounts {
     pub(super) pinched: usize,
-    pub(super) cloth_contacts: usize,
     pub(super) searches_skipped: usize,
-    pub(super) fold_searches_skipped: usize,
     /// Deepest vertex below the skin before and after projection, metres.
     pub(super) penetration: f64,
     pub(super) penetration_left: f64,
@@ -27,9 +25,7 @@ pub(in crate::live) struct ContactCounts {
 impl ContactCounts {
     pub(in crate::live) fn add_to(&self, r: &mut StepReport) {
         r.pinched += self.pinched;
-        r.cloth_contacts += self.cloth_contacts;
         r.searches_skipped += self.searches_skipped;
-        r.fold_searches_skipped += self.fold_searches_skipped;
         r.penetration = r.penetration.max(self.penetration);
         r.penetration_left = r.penetration_left.max(self.penetration_left);
     }
@@ -49,19 +45,8 @@ pub(in crate::live) struct ContactChunk {
     pub(in crate::live) nearest: Vec<[u32; 2]>,
     /// Motion left until the next query of both kinds of parts, metres.
     pub(super) clearance: Vec<[f32; 2]>,
-    /// Nearest vertices of the garments further out, by garment.
-    pub(in crate::live) layers: Vec<Vec<u32>>,
-    /// Intersects cloth: no fold constrains it.
-    pub(super) intersecting: Vec<bool>,
-    /// No fold was near in the last interval.
-    pub(super) is_alone: Vec<bool>,
-    /// Released from contact: inside another body part, or overstretched.
-    pub(super) released: Vec<bool>,
-    /// Last vertex that each vertex of the garment was a neighbour of.
-    pub(super) neighbour_of: Vec<u32>,
-    /// Contact planes of the body and of cloth.
+    /// Contact planes of the body.
     pub(in crate::live) body_planes: Vec<ContactPlane>,
-    pub(in crate::live) cloth_planes: Vec<ContactPlane>,
     /// Vertices projected out of the skin, and their displacements since the step began, metres.
     pub(in crate::live) projected: Vec<(u32, V4)>,
     pub(in crate::live) report: ContactCounts,
@@ -83,22 +68,8 @@ impl ContactChunk {
         let all = || vertices.iter().map(|v| *v as usize);
         self.nearest.clear();
         self.nearest.extend(all().map(|v| from.nearest[v]));
-        self.layers.resize_with(from.layers.len(), Vec::new);
-        for (to, from) in self.layers.iter_mut().zip(&from.layers) {
-            to.clear();
-            to.extend(all().filter_map(|v| from.get(v)));
-        }
-        let intersects = |v: &u32| from.intersecting.binary_search(v).is_ok();
-        self.intersecting.clear();
-        self.intersecting.extend(vertices.iter().map(intersects));
-        for flags in [&mut self.is_alone, &mut self.released] {
-            flags.clear();
-            flags.resize(vertices.len(), false);
-        }
         self.clearance.clear();
         self.clearance.resize(vertices.len(), [0.0; 2]);
-        self.neighbour_of.clear();
-        self.neighbour_of.resize(from.positions.len(), u32::MAX);
         self.report = ContactCounts::default();
     }
 }

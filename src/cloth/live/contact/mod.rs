@@ -1,9 +1,11 @@
-//! Contact generation for worn garments: against the body, other layers and their own folds.
+//! Contact generation for worn garments: against the body, and of cloth with cloth.
 
 pub(super) mod anchor;
 pub(crate) mod body_contact;
 pub(super) mod chunk;
-pub(crate) mod cloth_contact;
-pub(crate) mod layer_height;
+mod near_candidates;
+mod near_pairs;
+mod outfit_vertices;
+pub(super) mod pair_contact;
 pub mod self_contact;
 pub(super) mod skin_projection;

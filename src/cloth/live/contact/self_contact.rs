@@ -8,7 +8,7 @@ use crate::live::solver::explicit::{ContactPlane, V4};
 pub use crate::settings::SelfContactSettings;
 use tryon_geometry::math::order_statistics::percentile;
 use tryon_geometry::math::{P3, V3};
-use tryon_geometry::mesh::Csr;
+use tryon_geometry::mesh::{Csr, edge_faces};
 use tryon_geometry::par::Par;
 use tryon_geometry::spatial::HashGrid;
 use wide::f32x4;
@@ -26,6 +26,9 @@ pub struct SelfContactModel {
     pub surface: SurfaceModel,
     /// Vertices within two rings, which do not count as another fold.
     excluded: Csr,
+    /// Ends of each edge, the smaller first, and the edges of each face.
+    pub(crate) edges: Vec<[u32; 2]>,
+    pub(crate) face_edges: Vec<[u32; 3]>,
     /// 95th percentile of the edge lengths, metres.
     edge: f32,
     settings: SelfContactSettings,
@@ -108,8 +111,6 @@ pub struct Search {
     pub reach: f32,
     /// Radius of the query for corners.
     pub corner: f32,
-    /// Folds meet half-way and are released where they part; else each keeps off the other's position.
-    halfway: bool,
 }
 
 impl SelfContactModel {
@@ -120,8 +121,20 @@ impl SelfContactModel {
         settings: SelfContactSettings,
     ) -> Self {
         let mut lengths: Vec<f32> = lengths.collect();
+        let (mut edges, mut face_edges) = (Vec::new(), vec![[0; 3]; surface.faces().len()]);
+        for of_edge in edge_faces(surface.faces()).chunk_by(|a, b| a.0 == b.0) {
+            for (ends, face) in of_edge {
+                let corners = surface.faces()[*face as usize];
+                // The edge opposite to the corner that is no end.
+                let k = (0..3).find(|k| !ends.contains(&corners[*k])).unwrap_or(0);
+                face_edges[*face as usize][k] = edges.len() as u32;
+            }
+            edges.push(of_edge[0].0);
+        }
         Self {
             excluded: surface.second_neighbours(),
+            edges,
+            face_edges,
             surface,
             edge: percentile(&mut lengths, 95).unwrap_or(0.0),
             settings,
@@ -131,16 +144,9 @@ impl SelfContactModel {
     pub fn edge(&self) -> f32 {
         self.edge
     }
-    /// Query in worn garments, whose planes last for `span` seconds.
-    pub fn search(&self, thickness: f32, span: f32) -> Search {
-        let s = &self.settings;
-        let reach = (thickness + s.closing * span)
-            .min(s.max_reach)
-            .min(s.reach_edges * self.edge);
-        Search {
-            halfway: false,
-            ..self.with_reach(thickness, reach, s.closing * span)
-        }
+    /// Vertices within two rings of a vertex, itself included.
+    pub(crate) fn within_two_rings(&self, v: u32) -> &[u32] {
+        self.excluded.row(v as usize)
     }
     /// Query of a sheet whose points approach each other by at most `motion` metres until the next one.
     pub fn search_all(&self, thickness: f32, motion: f32) -> Search {
@@ -159,7 +165,6 @@ impl SelfContactModel {
             thickness,
             reach,
             corner: (reach + margin).hypot(beside),
-            halfway: true,
         }
     }
     /// Prepares a frame whose positions and velocities are set, for queries too if there is a `search`.
@@ -250,8 +255,7 @@ impl SelfContactModel {
         };
         // Half-way to contact: both keep their mean velocity and neither passes the other.
         let gap = match far > search.thickness {
-            true if search.halfway => 0.5 * (far + search.thickness),
-            true => search.thickness,
+            true => 0.5 * (far + search.thickness),
             false => far,
         };
         let mut plane = frame.contact_plane(self, i, hit, side, gap);
@@ -259,7 +263,7 @@ impl SelfContactModel {
         let own = V4::new(own.x, own.y, own.z);
         plane.velocity = (plane.velocity + own).scale(0.5);
         // Folds that part need no plane.
-        if search.halfway && plane.normal.dot(own - plane.velocity) > 0.0 {
+        if plane.normal.dot(own - plane.velocity) > 0.0 {
             return None;
         }
         Some((plane, far))

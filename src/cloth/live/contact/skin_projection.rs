@@ -11,6 +11,8 @@ pub(in crate::live) struct SkinProjection<'a> {
     pub(in crate::live) model: &'a Model,
     pub(in crate::live) body: &'a CollisionBody,
     pub(in crate::live) grid: &'a SkinGrid,
+    /// Time since the contact planes were generated, s.
+    pub(in crate::live) since_query: f32,
 }
 
 impl SkinProjection<'_> {
@@ -82,10 +84,15 @@ impl SkinProjection<'_> {
                 continue;
             }
             c.report.penetration = c.report.penetration.max(f64::from(depth));
-            let moved = v4(&(hit.point + hit.normal * height - p.motion.start[i].point()));
-            c.projected.push((i as u32, moved));
-            x = (p.motion.start[i] + moved).point();
-            let left = surface.closest(skin, &x, hit.vertex, masks[side]);
+            let target = v4(&(hit.point + hit.normal * height).coords);
+            x = p.held_by_cloth(i, target, self.since_query).point();
+            let mut left = surface.closest(skin, &x, hit.vertex, masks[side]);
+            if -left.signed_distance > settings.max_held_depth {
+                x = left.point - left.normal * settings.max_held_depth;
+                left = surface.closest(skin, &x, left.vertex, masks[side]);
+            }
+            c.projected
+                .push((i as u32, v4(&x.coords) - p.motion.start[i]));
             let left = f64::from(-left.signed_distance);
             c.report.penetration_left = c.report.penetration_left.max(left);
             near = candidates(&x);

@@ -1,6 +1,5 @@
 //! Repair of worn garments: intersections, sleeves that lost their arm, and bodies that teleport.
 
-pub(crate) mod recover_sleeves;
 pub(crate) mod reference;
 pub mod sleeve_rings;
 mod smooth_locally;

@@ -1,38 +1,32 @@
-//! Untangles worn garments now and then, and smooths cloth that stays intersected.
+//! Untangles worn garments now and then.
 //!
-//! Contact keeps a fold on its side, also where that is the wrong one. So each garment is queried as a whole from time to
-//! time, and intersecting cloth moves apart a little. Where that does not help for some queries, it is smoothed locally.
+//! Contact keeps cloth on its side, also where that is the wrong one. So an outfit is queried as a whole from time to time,
+//! and in every step while it intersects itself; intersecting cloth moves apart a little.
 
 use super::untangler::Untangler;
 use crate::contact::SurfaceFrame;
 use crate::live::outfit_model::Model;
 use crate::live::state::{GarmentState, State};
 use crate::settings::{ClothRepairSettings, Config};
-use tryon_garment::Region;
 use tryon_geometry::math::{P3, V3d};
+use tryon_geometry::mesh::Face;
 
 /// Iterations of a query.
 const ITERATIONS: usize = 8;
-/// Intersection counter from which on a vertex is smoothed, and its largest value: four more queries after it is free.
-const STUCK: u8 = 3;
-const MAX_COUNT: u8 = 6;
-/// Rings around a stuck vertex that are smoothed.
-const SMOOTHED_RINGS: usize = 2;
 
-/// Scratch of untangling.
+/// Scratch of untangling; vertices of all garments are numbered through.
 #[derive(Debug, Default)]
 pub(in crate::live) struct UntangleWork {
-    /// Of each garment.
-    sheets: Vec<Untangler>,
-    /// Positions of one garment before a query and after, metres.
+    outfit: Option<Untangler>,
+    /// Positions before a query and after, metres.
     from: Vec<V3d>,
     x: Vec<V3d>,
-    /// Vertices that must not move.
-    fixed: Vec<bool>,
+    /// Inverse masses, 1/kg; 0 of vertices that must not move.
+    weights: Vec<f64>,
 }
 
 impl UntangleWork {
-    /// Untangles the garments due in a step of `dt` seconds that do not all sleep, outside `body`.
+    /// Untangles an outfit that is due in a step of `dt` seconds and does not sleep as a whole, outside `body`.
     /// Returns the intersections found.
     pub(in crate::live) fn untangle_due(
         &mut self,
@@ -51,119 +45,85 @@ impl UntangleWork {
             return 0;
         }
         let every = (untangle / dt).round().max(1.0) as u64;
-        // In turn, so that the cost is spread over steps.
-        let is_due = |k: &usize| (state.frames + *k as u64).is_multiple_of(every);
-        let due: Vec<usize> = (0..model.garments.len()).filter(is_due).collect();
-        let mut found = 0;
-        for k in due {
-            if self.load(model, state, k) {
-                found += self.untangle(model, &mut state.garments[k], k, body);
-                self.smooth_stuck(model, &mut state.garments[k], k, body);
-            }
+        // Intersecting cloth has no contact: it moves apart in every step, or more of it would follow.
+        let intersects = state.garments.iter().any(|g| !g.intersecting.is_empty());
+        let is_due = state.frames.is_multiple_of(every) || intersects;
+        if !is_due || !self.load(model, state) {
+            return 0;
         }
-        found
+        self.untangle(model, state, body)
     }
 
-    /// Loads a garment; `false` if none of it may move.
-    fn load(&mut self, model: &Model, state: &State, k: usize) -> bool {
-        let g = &state.garments[k];
-        let islands = &model.garments[k].islands;
-        let sleeps = |v: u32| state.sleep.is_asleep(islands, k, v);
-        self.fixed.clear();
-        self.fixed.extend((0..g.positions.len() as u32).map(sleeps));
-        if self.fixed.iter().all(|f| *f) {
-            return false;
-        }
-        let anchors = model.outfit.anchors[k].iter();
-        anchors
-            .filter(|a| a.strength >= 1.0)
-            .for_each(|a| self.fixed[a.vertex as usize] = true);
-        for k in self.sheets.len()..=k {
-            let at = doubled(&state.garments[k].positions);
-            let (faces, settings) = (
-                &model.outfit.garments[k].faces,
-                model.config.repair.untangler,
-            );
-            self.sheets.push(Untangler::new(faces, &at, settings));
-        }
+    /// Loads an outfit; `false` if none of it may move.
+    fn load(&mut self, model: &Model, state: &State) -> bool {
+        self.weights.clear();
         self.x.clear();
-        self.x.extend(doubled(&g.positions));
+        for (k, (g, m)) in state.garments.iter().zip(&model.garments).enumerate() {
+            let first = self.weights.len();
+            self.x
+                .extend(g.positions.iter().map(|p| p.coords.cast::<f64>()));
+            let weight = |(v, mass): (u32, &f64)| {
+                let sleeps = state.sleep.is_asleep(&m.islands, k, v);
+                if sleeps { 0.0 } else { 1.0 / mass }
+            };
+            self.weights.extend((0u32..).zip(&m.sheet.mass).map(weight));
+            let anchors = model.outfit.anchors[k].iter();
+            anchors
+                .filter(|a| a.strength >= 1.0)
+                .for_each(|a| self.weights[first + a.vertex as usize] = 0.0);
+        }
         self.from.clone_from(&self.x);
-        true
+        self.weights.iter().any(|w| *w > 0.0)
     }
 
     /// Moves what intersects apart; returns the intersections found at first.
-    fn untangle(
-        &mut self,
-        model: &Model,
-        g: &mut GarmentState,
-        k: usize,
-        body: &SurfaceFrame,
-    ) -> usize {
-        let (mass, fixed) = (&model.garments[k].sheet.mass, &self.fixed);
-        let weight = |v: usize| if fixed[v] { 0.0 } else { 1.0 / mass[v] };
-        let sheet = &mut self.sheets[k];
-        sheet.invalidate();
-        g.intersection_count.resize(self.x.len(), 0);
+    fn untangle(&mut self, model: &Model, state: &mut State, body: &SurfaceFrame) -> usize {
+        let settings = model.config.repair.untangler;
+        let x = &mut self.x;
+        let outfit =
+            (self.outfit).get_or_insert_with(|| Untangler::new(&faces(model), x, settings));
+        outfit.invalidate();
         let mut found = 0;
         for r in 0..ITERATIONS {
-            let report = sheet.iterate(model.config.par, &mut self.x, weight);
+            let report = outfit.iterate(model.config.par, x, |v| self.weights[v]);
             if r == 0 {
                 found = report.intersections;
-                for (n, is_found) in g.intersection_count.iter_mut().zip(sheet.intersecting()) {
-                    *n = if is_found {
-                        (*n + 1).min(MAX_COUNT)
-                    } else {
-                        n.saturating_sub(1)
-                    };
-                }
             }
             if report.intersections == 0 {
                 break;
             }
         }
-        g.intersecting.clear();
         let limits = &model.config.repair;
-        for (v, (from, to)) in moved(&self.from, &self.x) {
-            let displacement = (to - from).cap_magnitude(limits.max_displacement);
-            g.displace(v, from, displacement, body, limits);
-            // A capped displacement leaves the vertex on the wrong side.
-            if sheet.displacements[v].1 > 0.0 || displacement != to - from {
-                g.intersecting.push(v as u32);
+        let mut first = 0;
+        for g in &mut state.garments {
+            g.intersecting.clear();
+            for v in 0..g.positions.len() {
+                let (from, to) = (&self.from[first + v], &x[first + v]);
+                if from == to {
+                    continue;
+                }
+                let displacement = (to - from).cap_magnitude(limits.max_displacement);
+                g.displace(v, from, displacement, body, limits);
+                // A capped displacement leaves the vertex on the wrong side.
+                if outfit.displacements[first + v].1 > 0.0 || displacement != to - from {
+                    g.intersecting.push(v as u32);
+                }
             }
+            first += g.positions.len();
         }
         found
     }
+}
 
-    /// Smooths around vertices that intersected in many queries.
-    fn smooth_stuck(&mut self, model: &Model, g: &mut GarmentState, k: usize, body: &SurfaceFrame) {
-        let stuck: Vec<bool> = g.intersection_count.iter().map(|n| *n >= STUCK).collect();
-        if !stuck.contains(&true) {
-            return;
-        }
-        self.from.clear();
-        self.from.extend(doubled(&g.positions));
-        self.x.clone_from(&self.from);
-        // A smoothed sleeve leaves its cuff behind and turns inside out.
-        let (own, fixed) = (&model.garments[k].own, &self.fixed);
-        let movable = |v: usize| !fixed[v] && !Region(own[v]).meets(Region::ARMS);
-        self.sheets[k].smooth_locally(&mut self.x, stuck, movable, SMOOTHED_RINGS);
-        let limits = &model.config.repair;
-        for (v, (from, to)) in moved(&self.from, &self.x) {
-            let displacement = (to - from).cap_magnitude(limits.max_smoothing);
-            g.displace(v, from, displacement, body, limits);
-        }
+/// Faces of all garments, vertices numbered through.
+fn faces(model: &Model) -> Vec<Face> {
+    let mut faces = Vec::new();
+    let mut first = 0;
+    for g in &model.outfit.garments {
+        faces.extend(g.faces.iter().map(|f| f.map(|v| v + first)));
+        first += g.vertices as u32;
     }
-}
-
-fn doubled(positions: &[P3]) -> Vec<V3d> {
-    positions.iter().map(|p| p.coords.cast()).collect()
-}
-
-/// Vertices with different positions.
-fn moved<'a>(from: &'a [V3d], to: &'a [V3d]) -> impl Iterator<Item = (usize, (&'a V3d, &'a V3d))> {
-    let all = from.iter().zip(to).enumerate();
-    all.filter(|(_, (from, to))| from != to)
+    faces
 }
 
 impl GarmentState {

@@ -86,11 +86,11 @@ mod tests {
     fn speed_limit_sets_in_after_the_free_swing_and_decays_to_its_floor() {
         let settings = StillnessSettings::default();
         let after = |frame: i32| settings.speed_limit_after(f64::from(frame) / 30.0);
-        assert!((0..=9).all(|i| after(i).is_none()));
-        let speeds: Vec<f32> = (10..90).filter_map(after).collect();
-        assert_eq!(speeds.len(), 80);
+        assert!((0..=17).all(|i| after(i).is_none()));
+        let speeds: Vec<f32> = (19..90).filter_map(after).collect();
+        assert_eq!(speeds.len(), 71);
         assert!(speeds.windows(2).all(|s| s[1] <= s[0]), "{speeds:?}");
-        assert!(speeds[0] < 2.0 && speeds[79] == 0.01, "{speeds:?}");
+        assert!(speeds[0] < 2.0 && speeds[70] == 0.01, "{speeds:?}");
         let two = settings.free_swing + 2.0 * settings.speed_half_life;
         let later = settings.speed_limit_after(two).expect("a limit");
         assert!((later - 0.5).abs() < 1e-6, "{later}");

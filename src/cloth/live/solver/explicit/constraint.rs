@@ -20,12 +20,19 @@ pub struct ContactPlane {
 impl ContactPlane {
     /// Speed of the plane along its normal (m/s).
     #[inline(always)]
-    pub(super) fn rate(&self) -> f32 {
+    pub fn rate(&self) -> f32 {
         self.normal.dot(self.velocity)
+    }
+    /// The plane `span` seconds later.
+    pub fn after(&self, span: f32) -> Self {
+        Self {
+            offset: self.offset + self.rate() * span,
+            ..*self
+        }
     }
     /// Signed distance of `x` at time `t` since the query (m).
     #[inline(always)]
-    pub(super) fn gap(&self, x: V4, t: f32) -> f32 {
+    pub fn gap(&self, x: V4, t: f32) -> f32 {
         self.normal.dot(x) - self.offset - self.rate() * t
     }
 }

@@ -1,7 +1,8 @@
 //! Symplectic Euler: velocities under accelerations, then positions under velocities.
 
 use super::active_set::{active_ranges, clip};
-use super::constraint::{ContactPlane, Pin};
+use super::constraint::Pin;
+use super::contact::VertexPlanes;
 use super::dispatch::wide;
 use super::elastic::elastic_kernel;
 use super::filtering::filter_kernel;
@@ -17,7 +18,7 @@ impl PatchState {
         &mut self,
         f: &PatchModel,
         step: &Substep,
-        planes: &[ContactPlane],
+        planes: &VertexPlanes,
         pins: &[Pin],
     ) {
         wide!(elastic_kernel(self, f: &PatchModel, step: &Substep));
@@ -123,7 +124,7 @@ mod tests {
         };
         let (mut scalar, mut wide) = (make(), make());
         elastic_kernel(&mut scalar.states[0], Scalar, &scalar.models[0], &step);
-        wide.states[0].integrate_velocities(&wide.models[0], &step, &[], &[]);
+        wide.states[0].integrate_velocities(&wide.models[0], &step, &VertexPlanes::default(), &[]);
         let [scalar, wide] =
             [&scalar, &wide].map(|lab| &lab.states[0].scratch.acceleration[..x.len()]);
         assert!(scalar.iter().any(|a| a.dot(*a) > 1.0));

@@ -15,7 +15,6 @@ pub(crate) mod edge_stiffness;
 mod elastic;
 mod elements;
 mod filtering;
-pub(crate) mod fold_limit;
 pub(crate) mod halo;
 mod integrate;
 pub(crate) mod mass_filter;
@@ -33,8 +32,7 @@ mod tests;
 mod vec4;
 
 pub use constraint::{ContactPlane, Pin};
-pub use contact::Recovery;
-pub use fold_limit::{FoldActivation, FoldLimit};
+pub use contact::{Recovery, VertexPlanes};
 pub use patch_model::PatchModel;
 pub use patch_state::{Exemptions, PatchState, Substep};
 pub use stable_sheet::{StableSheet, StepSpec};

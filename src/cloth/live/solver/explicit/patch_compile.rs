@@ -1,7 +1,7 @@
 //! Patches of a sheet: partition into owned vertices, ghosts around them, and arrays in local numbers.
 
 use super::blocks::{hinge_blocks, quad_blocks};
-use super::elements::{CurvedHinge, Diagonal, EdgeTriangle};
+use super::elements::{CurvedHinge, EdgeTriangle};
 use super::patch_model::{FilterOverflow, FilterRow, PatchModel, ROW};
 use super::simd::{LANES, Slot};
 use super::stable_sheet::StableSheet;
@@ -85,15 +85,9 @@ impl StableSheet {
             v: b.v.map(at),
             ..*b
         };
-        let diagonals = self.diagonals.iter().filter(|d| inside(&d.ends));
-        let diagonal = |d: &Diagonal| Diagonal {
-            ends: d.ends.map(at),
-            ..*d
-        };
         PatchModel {
             quads: quad_blocks(&triangles.map(triangle).collect::<Vec<_>>()),
             bent: hinge_blocks(bent.map(hinge).collect()),
-            diagonals: diagonals.map(diagonal).collect(),
             filter_rows,
             filter_overflow,
             filter: self.filter.clone(),

@@ -5,7 +5,6 @@
 //! not depend on the number of threads.
 
 use super::blocks::{HingeBlock, QuadBlock};
-use super::elements::Diagonal;
 use super::simd::Slot;
 
 /// Neighbours of a vertex that fit a filter row: most vertices of a triangulation have six.
@@ -55,7 +54,6 @@ pub struct PatchModel {
     pub(super) bend_count: Vec<u16>,
     pub(super) bend: Vec<(Slot, f32)>,
     pub(super) bent: Vec<HingeBlock>,
-    pub(super) diagonals: Vec<Diagonal>,
     pub(super) damping: f32,
 }
 

@@ -4,7 +4,7 @@ use super::active_set::ActiveSet;
 use super::patch_model::PatchModel;
 use super::vec4::{SlotArray, V4};
 
-/// Vertices that fold limits and speed limits leave as they are; shape `[vertices]` each.
+/// Vertices that speed limits leave as they are; shape `[vertices]` each.
 #[derive(Clone, Copy, Debug)]
 pub struct Exemptions<'a> {
     /// Vertices with a prescribed position.

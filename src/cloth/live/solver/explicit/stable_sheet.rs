@@ -1,7 +1,7 @@
 //! A sheet as coupled edge springs, softened where a step would be unstable.
 
 use super::edge_stiffness::TriangleSprings;
-use super::elements::{CurvedHinge, Diagonal, EdgeTriangle, diagonals};
+use super::elements::{CurvedHinge, EdgeTriangle};
 use super::mass_filter::MassFilter;
 use super::stability::{
     FlatSheet, bending_eigenvalue, element_limits, hinge_limits, soften, without_outliers,
@@ -37,7 +37,6 @@ pub struct StableSheet {
     /// Vertex pairs with the bending stiffness between them (N/m).
     pub(super) bend: Vec<([u32; 2], f32)>,
     pub(super) bent: Vec<CurvedHinge>,
-    pub(super) diagonals: Vec<Diagonal>,
     /// Weight of each edge in the mass filter (kg).
     pub(super) filter_weight: Vec<f32>,
     /// Coefficients of the mass filter, the lowest (1) first.
@@ -66,10 +65,6 @@ impl StableSheet {
         let identity = filter.identity();
         let keep_bend = kept_bending(sheet, spec, &identity, settings);
         let (bend, bent) = bending(sheet, &keep_bend, &edges, settings.flat);
-        let diagonal = |(ends, flat)| Diagonal {
-            ends,
-            flat: flat as f32,
-        };
         Self {
             kept_stiffness: kept / area.max(f64::MIN_POSITIVE),
             soft_elements: keep.iter().filter(|k| **k < 1.0).count(),
@@ -79,7 +74,6 @@ impl StableSheet {
             ends: edges.ends(),
             bend,
             bent,
-            diagonals: diagonals(sheet).map(diagonal).collect(),
             filter_weight: filter.weight.iter().map(|w| *w as f32).collect(),
             filter: filter.coefficients.iter().map(|c| *c as f32).collect(),
             damping: sheet.damping as f32,

@@ -3,6 +3,7 @@
 use super::halo::HaloExchange;
 use super::{
     ContactPlane, PatchModel, PatchState, Pin, Recovery, StableSheet, StepSpec, Substep, V4,
+    VertexPlanes,
 };
 use crate::live::Sheet;
 use crate::settings::SolverSettings;
@@ -179,13 +180,14 @@ impl Lab {
             gravity: self.gravity,
             rings: usize::MAX,
         };
+        let planes = VertexPlanes::new(&[], planes);
         for s in 0..block {
             if s % self.bending_interval == 0 {
                 let kept = self.bending_interval.min(block - s) as f32;
                 m.update_bending(f, h * kept * 0.5, usize::MAX);
             }
-            m.integrate_velocities(f, &step, planes, pins);
-            m.resolve_contacts(planes, 0.0, h, RECOVERY);
+            m.integrate_velocities(f, &step, &planes, pins);
+            m.resolve_contacts(&planes, [0.0, h], [RECOVERY; 2]);
             m.apply_pins(pins, 0.0, h);
             m.integrate_positions(f, &step, f32::INFINITY);
         }

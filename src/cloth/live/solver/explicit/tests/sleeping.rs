@@ -1,7 +1,9 @@
 //! Sleeping vertices against held ones.
 
 use crate::live::solver::explicit::test_sheets::{cotton, grid, hold, sheet, stable_step};
-use crate::live::solver::explicit::{PatchModel, PatchState, StableSheet, StepSpec, Substep, V4};
+use crate::live::solver::explicit::{
+    PatchModel, PatchState, StableSheet, StepSpec, Substep, V4, VertexPlanes,
+};
 use crate::settings::SolverSettings;
 use tryon_geometry::math::V3d;
 
@@ -30,7 +32,7 @@ fn fall(f: &PatchModel, x: &[V3d], h: f32, first: usize, sleeps: bool) -> PatchS
         if i % 3 == 0 {
             m.update_bending(f, 1.5 * h, usize::MAX);
         }
-        m.integrate_velocities(f, &step, &[], &pins);
+        m.integrate_velocities(f, &step, &VertexPlanes::default(), &pins);
         m.apply_pins(&pins, 0.0, h);
         m.integrate_positions(f, &step, f32::INFINITY);
     }
