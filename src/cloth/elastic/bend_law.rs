@@ -4,6 +4,7 @@ use super::jet::Smooth;
 use super::measured_bend::MeasuredBend;
 use super::{ElasticError, Jet};
 use nalgebra::{Matrix3, Vector3};
+use tryon_garment::Bending;
 
 /// Energy density of bending by the curvature (κᵤᵤ, κᵥᵥ, 2 κᵤᵥ) (1/m).
 #[derive(Clone, Debug, PartialEq)]
@@ -17,9 +18,15 @@ pub enum BendLaw {
 impl BendLaw {
     /// Isotropic plate: rigidity B (N·m) and Poisson ratio.
     pub fn isotropic(rigidity: f64, poisson: f64) -> Self {
-        let (b, c) = (rigidity, rigidity * poisson);
-        let twist = 0.5 * rigidity * (1.0 - poisson);
-        Self::Linear(Matrix3::new(b, c, 0.0, c, b, 0.0, 0.0, 0.0, twist))
+        Self::orthotropic(&Bending::uniform(rigidity), poisson)
+    }
+    /// Orthotropic plate: rigidity of strips curved along weft and warp, and the geometric mean of both Poisson ratios. Twist
+    /// is what the rigidity along the bias leaves, at least none.
+    pub fn orthotropic(bending: &Bending, poisson: f64) -> Self {
+        let (u, v) = (bending.weft, bending.warp);
+        let c = poisson * (u * v).sqrt();
+        let twist = (bending.along_bias() - 0.25 * (u + v) - 0.5 * c).max(0.0);
+        Self::Linear(Matrix3::new(u, c, 0.0, c, v, 0.0, 0.0, 0.0, twist))
     }
     /// Energy per rest area (N/m), moment (N) and tangent (N·m).
     pub fn expand(&self, curvature: &Vector3<f64>) -> Jet {

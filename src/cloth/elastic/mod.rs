@@ -19,6 +19,7 @@ pub(crate) mod model;
 mod packed;
 pub(crate) mod rest_sheet;
 pub(crate) mod stretch_law;
+mod tension_law;
 #[cfg(test)]
 mod tests;
 
@@ -34,3 +35,4 @@ pub use membrane::MembraneElement;
 pub use model::ClothModel;
 pub use rest_sheet::{RestSheet, RestTriangle};
 pub use stretch_law::{StretchLaw, Stretching};
+pub use tension_law::TensionLaw;

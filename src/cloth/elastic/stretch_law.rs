@@ -2,7 +2,7 @@
 
 use super::jet::Smooth;
 use super::measured_stretch::MeasuredStretch;
-use super::{ElasticError, Jet};
+use super::{ElasticError, Jet, TensionLaw};
 use nalgebra::{Matrix3, Vector3};
 
 /// Orthotropic membrane stiffness (N/m): σᵤᵤ = c₁₁ εᵤᵤ + c₁₂ εᵥᵥ, σᵥᵥ = c₁₂ εᵤᵤ + c₂₂ εᵥᵥ, σᵤᵥ = c₃₃ γ.
@@ -71,7 +71,9 @@ impl Stretching {
 pub enum StretchLaw {
     /// St. Venant–Kirchhoff with orthotropic moduli.
     Linear(Stretching),
-    /// Measured, nonlinear and anisotropic.
+    /// Tension curves along warp and weft (KES-FB1).
+    Tension(Box<TensionLaw>),
+    /// Measured along five directions, nonlinear and anisotropic (Wang et al. 2011).
     Measured(Box<MeasuredStretch>),
 }
 
@@ -80,6 +82,7 @@ impl StretchLaw {
     pub fn expand(&self, strain: &Vector3<f64>) -> Jet {
         match self {
             Self::Linear(s) => Jet::quadratic(&s.matrix(), strain),
+            Self::Tension(t) => t.expand(strain),
             Self::Measured(m) => m.expand(strain),
         }
     }
@@ -87,6 +90,7 @@ impl StretchLaw {
     pub fn value(&self, strain: &Vector3<f64>) -> f64 {
         match self {
             Self::Linear(s) => 0.5 * strain.dot(&(s.matrix() * strain)),
+            Self::Tension(t) => t.value(strain),
             Self::Measured(m) => m.value(strain),
         }
     }
@@ -97,6 +101,7 @@ impl StretchLaw {
     pub(super) fn check(&self) -> Result<(), ElasticError> {
         match self {
             Self::Linear(s) => s.check(),
+            Self::Tension(t) => t.at_rest.check(),
             // Positive by construction.
             Self::Measured(_) => Ok(()),
         }

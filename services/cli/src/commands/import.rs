@@ -165,7 +165,7 @@ fn json(args: &ImportArgs) -> Result<()> {
             m.stretch_warp,
             m.stretch_weft,
             m.shear,
-            m.bending
+            m.bending.mean()
         );
         return Ok(());
     }

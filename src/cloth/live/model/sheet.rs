@@ -1,10 +1,10 @@
 //! A sheet of cloth as a mechanical system: masses, flat triangles, hinges.
 
-use super::bending::{Hinge, Wing};
+use super::bending::{Hinge, HingeSide, Wing};
 use super::membrane::Membrane;
 use crate::live::ClothError;
 use nalgebra::Matrix3x2;
-use tryon_garment::Material;
+use tryon_garment::{Bending, Material};
 use tryon_geometry::math::order_statistics::percentile;
 use tryon_geometry::math::{P3, V3d};
 use tryon_geometry::mesh::{Face, Topology, TriMesh};
@@ -105,7 +105,7 @@ impl Sheet {
                 (e.v, twin.map_or(l, |t| 0.5 * (l + t)))
             })
             .collect();
-        let hinges = hinges(&topology, &flat, &elements, material.bending, curved_rest);
+        let hinges = hinges(&topology, &flat, &material.bending, curved_rest);
         Ok(Self {
             mass,
             elements,
@@ -194,6 +194,16 @@ impl FlatTriangles<'_> {
         let (p, q) = (at(a), at(b));
         (p[0] - q[0]).hypot(p[1] - q[1])
     }
+    /// Direction of the edge a b in a face, and the face's area.
+    fn side(&self, face: u32, [a, b]: [u32; 2]) -> HingeSide {
+        let (f, t) = (&self.faces[face as usize], &self.rest[face as usize]);
+        let at = |v: u32| f.iter().position(|q| *q == v).map_or([0.0; 2], |k| t[k]);
+        let (p, q) = (at(a), at(b));
+        HingeSide {
+            edge: [q[0] - p[0], q[1] - p[1]],
+            area: Element::new(*f, t).area,
+        }
+    }
     /// A face on the edge a b.
     fn wing(&self, face: u32, [a, b]: [u32; 2], apex: u32) -> Wing {
         Wing {
@@ -206,8 +216,7 @@ impl FlatTriangles<'_> {
 fn hinges(
     topology: &Topology,
     flat: &FlatTriangles<'_>,
-    elements: &[Element],
-    bending: f64,
+    bending: &Bending,
     curved_rest: Option<&[P3]>,
 ) -> Vec<Hinge> {
     let mut hinges = Vec::new();
@@ -216,11 +225,13 @@ fn hinges(
             continue;
         };
         let wings = [flat.wing(e.face, e.v, c), flat.wing(twin, e.v, d)];
-        let area = elements[e.face as usize].area + elements[twin as usize].area;
+        let sides = [e.face, twin].map(|face| flat.side(face, e.v));
+        let area = sides[0].area + sides[1].area;
+        let rigidity = 0.5 * (sides[0].rigidity(bending) + sides[1].rigidity(bending));
         let mut hinge = Hinge {
             v: [e.v[0], e.v[1], c, d],
             c: Hinge::coefficients(&wings),
-            w: 3.0 * bending / area,
+            w: 3.0 * rigidity / area,
             rest: 0.0,
         };
         if let Some(p) = curved_rest {
