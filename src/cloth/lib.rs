@@ -79,9 +79,10 @@ pub mod fine;
 pub mod live;
 pub mod scene;
 pub mod settings;
+mod specimens;
 
 pub use live::{
-    AnchorBinding, ClothError, Config, Element, GarmentState, Hinge, Input, Model, Outfit, Sheet,
+    AnchorBinding, BendingResolution, ClothError, Config, Element, GarmentState, Hinge, Input, Model, Outfit, Sheet,
     StagesMs, State, StepReport, Workspace, WornReference, collision_model, model, self_contact,
     sleeve_rings, solver, step, untangler,
 };

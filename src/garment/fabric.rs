@@ -60,6 +60,18 @@ const FILES: [(&str, &str); 9] = [
 ];
 
 impl Fabric {
+    /// Fabric of a material without a file.
+    pub fn of_material(material: Material) -> Self {
+        Self {
+            material,
+            drape_coefficient: None,
+            estimated: Vec::new(),
+        }
+    }
+    /// True if a field is no measurement of this fabric.
+    pub fn is_estimated(&self, field: &str) -> bool {
+        self.estimated.iter().any(|e| e == field || e == "all")
+    }
     /// Fabric of a preset, see [`Material::PRESETS`].
     ///
     /// # Errors

@@ -113,6 +113,7 @@ impl Material {
                 warp: bend(0),
                 weft: bend(2),
                 bias: Some(bend(1)),
+                friction: 0.0,
             },
             tensile: None,
             measured: Some(Box::new(m.clone())),

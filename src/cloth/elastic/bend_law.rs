@@ -2,7 +2,8 @@
 
 use super::jet::Smooth;
 use super::measured_bend::MeasuredBend;
-use super::{ElasticError, Jet};
+use super::{ElasticError, Jet, LoadingBend};
+use crate::settings::ElasticSettings;
 use nalgebra::{Matrix3, Vector3};
 use tryon_garment::Bending;
 
@@ -11,6 +12,8 @@ use tryon_garment::Bending;
 pub enum BendLaw {
     /// ½ κᵀ D κ with a symmetric positive D (N·m).
     Linear(Matrix3<f64>),
+    /// Linear with friction of the yarns (KES-FB2).
+    Loading(LoadingBend),
     /// Measured, with a stiffness that depends on direction and curvature.
     Measured(Box<MeasuredBend>),
 }
@@ -26,12 +29,21 @@ impl BendLaw {
         let (u, v) = (bending.weft, bending.warp);
         let c = poisson * (u * v).sqrt();
         let twist = (bending.along_bias() - 0.25 * (u + v) - 0.5 * c).max(0.0);
-        Self::Linear(Matrix3::new(u, c, 0.0, c, v, 0.0, 0.0, 0.0, twist))
+        let elastic = Matrix3::new(u, c, 0.0, c, v, 0.0, 0.0, 0.0, twist);
+        if bending.friction > 0.0 {
+            return Self::Loading(LoadingBend {
+                elastic,
+                friction: bending.friction,
+                onset: ElasticSettings::default().friction_onset,
+            });
+        }
+        Self::Linear(elastic)
     }
     /// Energy per rest area (N/m), moment (N) and tangent (N·m).
     pub fn expand(&self, curvature: &Vector3<f64>) -> Jet {
         match self {
             Self::Linear(d) => Jet::quadratic(d, curvature),
+            Self::Loading(l) => l.expand(curvature),
             Self::Measured(m) => m.expand(curvature),
         }
     }
@@ -39,6 +51,7 @@ impl BendLaw {
     pub fn at_rest(&self) -> Matrix3<f64> {
         match self {
             Self::Linear(d) => *d,
+            Self::Loading(l) => l.at_rest(),
             Self::Measured(m) => m.at_rest(),
         }
     }

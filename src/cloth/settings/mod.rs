@@ -18,9 +18,9 @@ pub use fine::{
     ContactSettings, DrapeSettings, NewtonSettings, ObstacleSpring, OfflineSettings,
     OfflineStartSettings, SleepSettings, TimeScheme,
 };
-pub use live::{ClothContactSettings, Config, LiveStepSettings, SelfContactSettings};
+pub use live::{ClothContactSettings, Config, LiveStepSettings, ResolutionSettings, SelfContactSettings};
 pub use repair::{ClothRepairSettings, SleeveSettings, UntanglerSettings};
-pub use scene::SceneSettings;
+pub use scene::{FabricTestSettings, SceneSettings};
 pub use solver::{FoldSettings, SolverSettings};
 pub use stillness::StillnessSettings;
 

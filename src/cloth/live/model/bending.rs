@@ -1,4 +1,8 @@
 //! Quadratic bending across an edge (Bergou et al. 2006): E = ½ w (|Σ cₖ xₖ| − rest)².
+//!
+//! Equilateral wings of area A in all, across the normal n and tangent t of their edge, have w |Σ cₖ xₖ|² = w A² (3 nᵀκn −
+//! tᵀκt)²/9. Over the three directions of such a mesh a cylinder's curvature κ costs ½ w A κ² per area, so that w = B/A
+//! has the rigidity B. The 3 B/A of a Laplacian at edge midpoints would be three times as stiff.
 
 use tryon_garment::Bending;
 use tryon_geometry::math::V3d;
@@ -58,8 +62,8 @@ pub(super) struct HingeSide {
 impl HingeSide {
     /// Rigidity (N·m) of the hinge: ½ (Bᵤ + Bᵥ) + ¾ (Bᵤ − Bᵥ) cos 2φ, φ from the weft to the edge's normal.
     ///
-    /// With the coefficients of equilateral wings, a hinge across n measures nᵀκn − ⅓ tᵀκt. Averaged over the directions
-    /// of an isotropic mesh, a weight f₀ + f₂ cos 2φ gives ⅓ f₀ ± ²⁄₉ f₂ along weft and warp: hence ¾ for ½.
+    /// A cylinder across the weft costs a hinge (1 + 2 cos 2φ)². Averaged over the directions of an isotropic mesh, a
+    /// rigidity f₀ + f₂ cos 2φ is f₀ ± ⅔ f₂ along weft and warp: hence ¾ for ½.
     pub(super) fn rigidity(&self, bending: &Bending) -> f64 {
         let [x, y] = self.edge;
         let double = (y * y - x * x) / (x * x + y * y).max(f64::MIN_POSITIVE);

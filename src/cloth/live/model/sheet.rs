@@ -2,7 +2,9 @@
 
 use super::bending::{Hinge, HingeSide, Wing};
 use super::membrane::Membrane;
+use super::resolution::BendingResolution;
 use crate::live::ClothError;
+use crate::settings::ResolutionSettings;
 use nalgebra::Matrix3x2;
 use tryon_garment::{Bending, Material};
 use tryon_geometry::math::order_statistics::percentile;
@@ -116,12 +118,14 @@ impl Sheet {
             friction: material.friction,
         })
     }
-    /// Sheet of a garment.
+    /// Sheet of a garment, with the bending that its edges carry ([`BendingResolution`]).
     ///
     /// # Errors
     /// As [`Sheet::new`].
     pub fn of_garment(g: &tryon_garment::GarmentMesh) -> Result<Self, ClothError> {
-        Self::new(g.vertices, &g.faces, &g.rest, &g.material, None)
+        let settings = ResolutionSettings::default();
+        let (_, carried) = BendingResolution::of(&g.material, &g.rest, &settings);
+        Self::new(g.vertices, &g.faces, &g.rest, &carried, None)
     }
     /// Elastic energy (J).
     pub fn energy(&self, x: &[V3d]) -> f64 {
@@ -231,7 +235,7 @@ fn hinges(
         let mut hinge = Hinge {
             v: [e.v[0], e.v[1], c, d],
             c: Hinge::coefficients(&wings),
-            w: 3.0 * rigidity / area,
+            w: rigidity / area,
             rest: 0.0,
         };
         if let Some(p) = curved_rest {
