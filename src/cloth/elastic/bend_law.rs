@@ -24,11 +24,15 @@ impl BendLaw {
         Self::orthotropic(&Bending::uniform(rigidity), poisson)
     }
     /// Orthotropic plate: rigidity of strips curved along weft and warp, and the geometric mean of both Poisson ratios. Twist
-    /// is what the rigidity along the bias leaves, at least none.
+    /// is what the rigidity along the bias leaves, or Huber's.
     pub fn orthotropic(bending: &Bending, poisson: f64) -> Self {
         let (u, v) = (bending.weft, bending.warp);
-        let c = poisson * (u * v).sqrt();
-        let twist = (bending.along_bias() - 0.25 * (u + v) - 0.5 * c).max(0.0);
+        let root = (u * v).sqrt();
+        let c = root * poisson;
+        let twist = match bending.bias {
+            Some(bias) => (bias - 0.25 * (u + v) - 0.5 * c).max(0.0),
+            None => 0.5 * root * (1.0 - poisson),
+        };
         let elastic = Matrix3::new(u, c, 0.0, c, v, 0.0, 0.0, 0.0, twist);
         if bending.friction > 0.0 {
             return Self::Loading(LoadingBend {
@@ -69,5 +73,35 @@ impl BendLaw {
             field: "bending stiffness",
             value,
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Rigidity (N·m) of a cylinder about an axis across 45°.
+    fn along_bias(law: &BendLaw) -> f64 {
+        let curvature = Vector3::new(0.5, 0.5, 1.0);
+        2.0 * law.expand(&curvature).value
+    }
+
+    #[test]
+    fn bias_is_measured_or_hubers_and_equal_directions_are_a_plate() {
+        let mut own = Bending {
+            warp: 4e-6,
+            weft: 1e-6,
+            bias: None,
+            friction: 0.0,
+        };
+        for poisson in [0.0, 0.3] {
+            let law = BendLaw::orthotropic(&own, poisson);
+            assert!((along_bias(&law) / own.along_bias() - 1.0).abs() < 1e-12);
+        }
+        own.bias = Some(2e-6);
+        let law = BendLaw::orthotropic(&own, 0.0);
+        assert!((along_bias(&law) / 2e-6 - 1.0).abs() < 1e-12);
+        let plate = BendLaw::isotropic(3e-6, 0.3).at_rest();
+        assert!((plate[(2, 2)] - 0.35 * 3e-6).abs() < 1e-18);
     }
 }
