@@ -1,16 +1,17 @@
 //! Sewn garments as cloth of the offline solver: all in one index space, each of its own fabric.
 
 use super::{
-    ElasticTerm, ElementTerm, EnergyTerm, OfflineCloth, OfflineError, StitchSprings, sewn_pairs,
+    AirDrag, ElasticTerm, ElementTerm, EnergyTerm, OfflineCloth, OfflineError, StitchSprings, sewn_pairs,
 };
 use crate::elastic::{ClothModel, ElasticFabric, RestSheet};
+use crate::settings::AirSettings;
 use nalgebra::Vector2;
 use tryon_garment::{GarmentMesh, Material};
 use tryon_geometry::math::V3d;
 use tryon_geometry::mesh::Face;
 
 impl OfflineCloth {
-    /// Garments, flat at rest as cut, their vertices one after another.
+    /// Garments in still air, flat at rest as cut, their vertices one after another.
     ///
     /// # Errors
     /// Names the face or modulus at fault; a vertex without a face has no mass.
@@ -35,6 +36,8 @@ impl OfflineCloth {
                 *sum += own;
             }
             terms.push(Box::new(ElasticTerm::new(model)) as Box<dyn EnergyTerm>);
+            let air = AirDrag::new(own.clone(), &AirSettings::default());
+            terms.push(Box::new(ElementTerm::new(air)));
             faces.extend(own);
             first += garment.vertices;
         }

@@ -1,6 +1,7 @@
 //! Offline cloth on contact that never fails: steps, static drape, animation, checkpoints, obstacle springs.
 
-pub(crate) mod animation;
+pub(crate) mod air_drag;
+mod animation;
 pub(crate) mod checkpoint;
 mod checks;
 pub(crate) mod contacts;
@@ -32,6 +33,7 @@ pub use crate::settings::{
 pub use animation::AnimationProgress;
 pub use checkpoint::{checkpoint_frame, checkpoint_state};
 pub use contacts::ContactReport;
+pub use air_drag::AirDrag;
 pub use drape::DrapeReport;
 pub use elastic_term::ElasticTerm;
 pub use energy_term::{ElementTerm, EnergyElements, EnergyTerm};

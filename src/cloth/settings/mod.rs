@@ -15,7 +15,7 @@ pub use contact::{
 };
 pub use elastic::ElasticSettings;
 pub use fine::{
-    ContactSettings, DrapeSettings, NewtonSettings, ObstacleSpring, OfflineSettings,
+    AirSettings, ContactSettings, DrapeSettings, NewtonSettings, ObstacleSpring, OfflineSettings,
     OfflineStartSettings, SleepSettings, TimeScheme,
 };
 pub use live::{ClothContactSettings, Config, LiveStepSettings, ResolutionSettings, SelfContactSettings};
