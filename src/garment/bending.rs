@@ -139,7 +139,11 @@ mod tests {
         assert!(own.friction == 0.0);
         let text = serde_json::to_string(&own).expect("text");
         assert_eq!(read(&text).expect("its own text"), own);
-        for wrong in [r#""soft""#, r#"{"warp": 1e-5}"#, r#"{"warp": 1, "weft": 1, "x": 1}"#] {
+        for wrong in [
+            r#""soft""#,
+            r#"{"warp": 1e-5}"#,
+            r#"{"warp": 1, "weft": 1, "x": 1}"#,
+        ] {
             let why = read(wrong).expect_err("refused").to_string();
             assert!(why.contains("`warp` and `weft`"), "{why}");
         }

@@ -5,7 +5,7 @@ use serde::Deserialize;
 
 /// Fabric of a file.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Fabric {
+pub struct FabricSample {
     /// Sheet.
     pub material: Material,
     /// Drape coefficient of the same fabric by Cusick's test, where its publication has one.
@@ -59,7 +59,7 @@ const FILES: [(&str, &str); 9] = [
     ("silk", include_str!("fabrics/silk.json")),
 ];
 
-impl Fabric {
+impl FabricSample {
     /// Fabric of a material without a file.
     pub fn of_material(material: Material) -> Self {
         Self {
@@ -95,7 +95,7 @@ impl Fabric {
 }
 
 impl FabricFile {
-    fn fabric(self) -> Result<Fabric, GarmentError> {
+    fn fabric(self) -> Result<FabricSample, GarmentError> {
         let [warp, weft] = match (&self.tensile, &self.stretch) {
             (Some(t), None) => [t.warp, t.weft].map(|c| c.cubic().stiffness),
             (None, Some(s)) => [s.warp, s.weft],
@@ -122,7 +122,7 @@ impl FabricFile {
             source: self.source,
         };
         material.check()?;
-        Ok(Fabric {
+        Ok(FabricSample {
             material,
             drape_coefficient: self.drape_coefficient,
             estimated: self.estimated,
@@ -149,7 +149,7 @@ impl Material {
     /// # Errors
     /// Lists the known names.
     pub fn preset(name: &str) -> Result<Self, GarmentError> {
-        Ok(Fabric::named(name)?.material)
+        Ok(FabricSample::named(name)?.material)
     }
 }
 
@@ -162,7 +162,7 @@ mod tests {
     fn files_are_usable() {
         assert_eq!(FILES.map(|f| f.0), Material::PRESETS);
         for name in Material::PRESETS {
-            let fabric = Fabric::named(name).expect("a file");
+            let fabric = FabricSample::named(name).expect("a file");
             let m = &fabric.material;
             assert!(m.name == name && m.source.len() > 40, "{name}");
             assert!((0.05..0.6).contains(&m.area_density), "{name}");

@@ -33,7 +33,7 @@ mod triangulate;
 
 pub use bending::Bending;
 pub use error::GarmentError;
-pub use fabric::Fabric;
+pub use fabric::FabricSample;
 pub use fabric_image::FabricImage;
 pub use flat_triangle::rest_area;
 pub use material::{IsotropicSolid, Material};

@@ -12,7 +12,7 @@ use tryon::formats::fabric_json::parse_fabric;
 use tryon::formats::garmentcode::{is_garmentcode, parse_garmentcode};
 use tryon::formats::npz::read_smpl;
 use tryon::garment::import::from_garmentcode;
-use tryon::garment::{Fabric, Material, Pattern, Size, Triangulation};
+use tryon::garment::{FabricSample, Material, Pattern, Size, Triangulation};
 use tryon::mirror::{CapturedWardrobe, Choice};
 
 /// Body to track: an SMPL-layout npz, or the embedded one.
@@ -78,7 +78,10 @@ pub(crate) fn choices(names: &[String], given: &GivenChoice<'_>) -> Result<Vec<C
         } else if name.ends_with(".json") {
             chosen.push(Choice::Pattern(Box::new(pattern(path)?)));
         } else if is_mesh(path) {
-            chosen.push(Choice::mesh(mesh_garment(path, body.clone(), material)?, size));
+            chosen.push(Choice::mesh(
+                mesh_garment(path, body.clone(), material)?,
+                size,
+            ));
         } else {
             chosen.push(Choice::library(name, size)?);
         }
@@ -104,21 +107,26 @@ pub(crate) struct GivenChoice<'a> {
 ///
 /// # Errors
 /// Lists the presets, or names the fault in the file.
-pub(crate) fn fabric(name: &str) -> Result<Fabric> {
+pub(crate) fn fabric(name: &str) -> Result<FabricSample> {
     let path = Path::new(name);
     if !name.ends_with(".json") {
-        return Ok(Fabric::named(name)?);
+        return Ok(FabricSample::named(name)?);
     }
     let text =
         std::fs::read_to_string(path).with_context(|| format!("cannot read {}", path.display()))?;
-    let stem = path.file_stem().and_then(|s| s.to_str()).unwrap_or("fabric");
+    let stem = path
+        .file_stem()
+        .and_then(|s| s.to_str())
+        .unwrap_or("fabric");
     let material = if text.contains("\"stretching\"") && !text.contains("\"measured\"") {
         Material::from_measured(stem, &parse_fabric(&text, path)?)?
     } else {
         serde_json::from_str(&text).with_context(|| path.display().to_string())?
     };
-    material.check().with_context(|| path.display().to_string())?;
-    Ok(Fabric::of_material(material))
+    material
+        .check()
+        .with_context(|| path.display().to_string())?;
+    Ok(FabricSample::of_material(material))
 }
 
 /// Folder of a capture, and the name of the one garment of it where the path is `FOLDER/NAME`.
@@ -166,11 +174,7 @@ fn is_mesh(path: &Path) -> bool {
 }
 
 /// Mesh garment of `material`, made on `body`, which is guessed when absent.
-fn mesh_garment(
-    path: &Path,
-    body: Option<SourceBody>,
-    material: &Material,
-) -> Result<MeshGarment> {
+fn mesh_garment(path: &Path, body: Option<SourceBody>, material: &Material) -> Result<MeshGarment> {
     let settings = MeshGarmentSettings::with_edge(Triangulation::default().edge_length);
     MeshGarment::read_on(path, body, material, &settings)
         .with_context(|| path.display().to_string())

@@ -224,8 +224,8 @@ impl FanCurvature {
 #[cfg(test)]
 mod tests {
     use super::super::edges::interior_edges;
-    use crate::specimens::strip::{StripMesh, StripPattern, strip};
     use super::*;
+    use crate::specimens::strip::{StripMesh, StripPattern, strip};
     use nalgebra::{DMatrix, Rotation2, Vector2};
     use tryon_geometry::math::V3d;
 

@@ -20,6 +20,7 @@ pub(crate) mod model;
 mod packed;
 pub(crate) mod rest_sheet;
 pub(crate) mod stretch_law;
+mod stretching;
 mod tension_law;
 #[cfg(test)]
 mod tests;
@@ -36,5 +37,6 @@ pub use measured_stretch::MeasuredStretch;
 pub use membrane::MembraneElement;
 pub use model::ClothModel;
 pub use rest_sheet::{RestSheet, RestTriangle};
-pub use stretch_law::{StretchLaw, Stretching};
+pub use stretch_law::StretchLaw;
+pub use stretching::Stretching;
 pub use tension_law::TensionLaw;

@@ -121,7 +121,12 @@ mod tests {
             Derivatives::energy(e.value, e.gradient.as_slice().to_vec())
                 .with_hessian(DMatrix::from_column_slice(9, 9, e.hessian.as_slice()))
         };
-        let moved = |d: f64| start.iter().flat_map(|p| [p.x, p.y, p.z + d]).collect::<Vec<_>>();
+        let moved = |d: f64| {
+            start
+                .iter()
+                .flat_map(|p| [p.x, p.y, p.z + d])
+                .collect::<Vec<_>>()
+        };
         let check = DerivativeCheck {
             step: 1e-6,
             ..DerivativeCheck::default()

@@ -1,7 +1,8 @@
 //! Sewn garments as cloth of the offline solver: all in one index space, each of its own fabric.
 
 use super::{
-    AirDrag, ElasticTerm, ElementTerm, EnergyTerm, OfflineCloth, OfflineError, StitchSprings, sewn_pairs,
+    AirDrag, ElasticTerm, ElementTerm, EnergyTerm, OfflineCloth, OfflineError, StitchSprings,
+    sewn_pairs,
 };
 use crate::elastic::{ClothModel, ElasticFabric, RestSheet};
 use crate::settings::AirSettings;

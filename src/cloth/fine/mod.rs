@@ -30,10 +30,10 @@ pub use crate::settings::{
     ContactSettings, DrapeSettings, NewtonSettings, ObstacleSpring, OfflineSettings,
     OfflineStartSettings, SleepSettings, TimeScheme,
 };
+pub use air_drag::AirDrag;
 pub use animation::AnimationProgress;
 pub use checkpoint::{checkpoint_frame, checkpoint_state};
 pub use contacts::ContactReport;
-pub use air_drag::AirDrag;
 pub use drape::DrapeReport;
 pub use elastic_term::ElasticTerm;
 pub use energy_term::{ElementTerm, EnergyElements, EnergyTerm};

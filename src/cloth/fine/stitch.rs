@@ -102,7 +102,10 @@ mod tests {
             evaluate,
         );
         let at = |y| [V3d::new(1.0, y, 0.0), V3d::zeros(), V3d::new(4.0, 0.0, 0.0)];
-        assert_eq!(springs.value(0, &SheetMotion::still(&at(0.5))), 0.5 * 40.0 * 0.25);
+        assert_eq!(
+            springs.value(0, &SheetMotion::still(&at(0.5))),
+            0.5 * 40.0 * 0.25
+        );
         assert_eq!(springs.value(0, &SheetMotion::still(&at(0.0))), 0.0);
     }
 }

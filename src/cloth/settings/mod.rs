@@ -18,7 +18,9 @@ pub use fine::{
     AirSettings, ContactSettings, DrapeSettings, NewtonSettings, ObstacleSpring, OfflineSettings,
     OfflineStartSettings, SleepSettings, TimeScheme,
 };
-pub use live::{ClothContactSettings, Config, LiveStepSettings, ResolutionSettings, SelfContactSettings};
+pub use live::{
+    ClothContactSettings, Config, LiveStepSettings, ResolutionSettings, SelfContactSettings,
+};
 pub use repair::{ClothRepairSettings, SleeveSettings, UntanglerSettings};
 pub use scene::{FabricTestSettings, SceneSettings};
 pub use solver::{FoldSettings, SolverSettings};

@@ -50,7 +50,6 @@ impl DrapeDisc {
         disc
     }
 
-
     /// Triangles between the last ring, from vertex `outer`, and the one before it, from `inner`.
     fn join_rings(&mut self, [inner, outer]: [u32; 2]) {
         let end = self.at.len() as u32;

@@ -52,7 +52,12 @@ pub(crate) fn elastica_tip(curve: &MomentCurve) -> [f64; 2] {
     const GROWTH: f64 = 1.5;
     // Angle, moment, forward and down by the distance r from the tip.
     let slope = |r: f64, y: [f64; 4]| {
-        [-curve.curvature(y[1]), r * y[0].cos(), y[0].cos(), y[0].sin()]
+        [
+            -curve.curvature(y[1]),
+            r * y[0].cos(),
+            y[0].cos(),
+            y[0].sin(),
+        ]
     };
     let add = |y: [f64; 4], k: [f64; 4], h: f64| std::array::from_fn(|d| y[d] + h * k[d]);
     let integrate = |tip: f64| {

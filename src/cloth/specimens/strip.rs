@@ -32,12 +32,7 @@ pub(crate) struct StripMesh {
 ///
 /// The first three columns of vertices are straight: held, they clamp the strip at u = 0 to second order in h, and no
 /// element at its end sees it bend.
-pub(crate) fn strip(
-    length: f64,
-    columns: usize,
-    rows: usize,
-    pattern: StripPattern,
-) -> StripMesh {
+pub(crate) fn strip(length: f64, columns: usize, rows: usize, pattern: StripPattern) -> StripMesh {
     let h = length / (columns as f64 - 1.5);
     let across = rows + 1;
     let mut random = Random(match pattern {

@@ -10,9 +10,7 @@ use serde::Serialize;
 use std::ops::ControlFlow;
 use std::process::ExitCode;
 use tryon::cloth::fine::{OfflineFrameReport, OfflineSettings, checkpoint_frame};
-use tryon::cloth::scene::{
-    self, FabricSolver, FabricTest, FabricTrial, OfflineScene, Scene,
-};
+use tryon::cloth::scene::{self, FabricSolver, FabricTest, FabricTrial, OfflineScene, Scene};
 use tryon::cloth::settings::FabricTestSettings;
 use tryon::formats::gltf::{GlbMesh, write_glb_motion};
 use tryon::geometry::math::P3;

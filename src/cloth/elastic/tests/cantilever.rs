@@ -1,9 +1,9 @@
 //! Cantilevers of cloth under their own weight against the heavy elastica.
 
 use super::statics::Statics;
+use super::{BendLaw, ClothModel, ElasticFabric, RestSheet, StretchLaw, Stretching};
 use crate::specimens::elastica::bending_length_of;
 use crate::specimens::strip::{StripMesh, StripPattern, strip};
-use super::{BendLaw, ClothModel, ElasticFabric, RestSheet, StretchLaw, Stretching};
 use tryon_geometry::math::V3d;
 
 /// Overhang (m), area density (kg/m²) and gravity (m/s²).

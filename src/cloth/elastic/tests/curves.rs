@@ -1,10 +1,10 @@
 //! Whole sheets against closed forms and measured curves of tension.
 
 use super::statics::Statics;
-use crate::specimens::strip::{StripMesh, StripPattern, strip};
 use super::{
     BendLaw, ClothModel, ElasticExpansion, ElasticFabric, RestSheet, StretchLaw, Stretching,
 };
+use crate::specimens::strip::{StripMesh, StripPattern, strip};
 use nalgebra::Matrix2;
 use tryon_formats::fabric_json::read_fabric;
 use tryon_formats::shared_data;

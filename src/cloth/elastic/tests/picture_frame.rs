@@ -7,10 +7,10 @@
 
 use super::curves::WOVEN;
 use super::statics::Statics;
-use crate::specimens::strip::{StripMesh, StripPattern, strip};
 use super::{BendLaw, ClothModel, ElasticExpansion, ElasticFabric, RestSheet};
 use super::{MeasuredStretch, StretchLaw};
 use crate::settings::ElasticSettings;
+use crate::specimens::strip::{StripMesh, StripPattern, strip};
 use nalgebra::Vector2;
 use tryon_formats::fabric_json::read_fabric;
 use tryon_formats::shared_data;

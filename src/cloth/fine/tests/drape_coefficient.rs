@@ -14,12 +14,12 @@ use tryon_geometry::math::V3d;
 use tryon_geometry::par::Par;
 
 /// Disc on its support.
-struct Specimen {
+struct DrapeSpecimen {
     disc: DrapeDisc,
     sheet: PlanarSheet,
 }
 
-impl Specimen {
+impl DrapeSpecimen {
     fn new(free: usize) -> Self {
         let disc = DrapeDisc::new(free);
         let sheet = PlanarSheet {
@@ -110,7 +110,7 @@ fn a_stiff_disc_sags_as_a_clamped_plate() {
     let (poisson, rigidity) = (0.3, 0.01);
     let expected = plate_rim(0.2 * GRAVITY, rigidity, poisson);
     let error = |free| {
-        let specimen = Specimen::new(free);
+        let specimen = DrapeSpecimen::new(free);
         let x = specimen.drape(isotropic(100.0, poisson, rigidity), 0.0, converged());
         let rim = x.iter().filter(|p| p.x.hypot(p.z) > 0.999 * SPECIMEN);
         let (sum, count) = rim.fold((0.0, 0.0), |s, p| (s.0 - p.y, s.1 + 1.0));
@@ -148,7 +148,7 @@ fn check_kind(name: &str) {
         ..NewtonSettings::default()
     };
     let coefficients = [4, 6].map(|free| {
-        let specimen = Specimen::new(free);
+        let specimen = DrapeSpecimen::new(free);
         let x = specimen.drape(ElasticFabric::measured(&data), 1e-3, newton);
         specimen.disc.drape_coefficient(&x)
     });

@@ -57,7 +57,10 @@ fn mean_edge(rest: &[[[f64; 2]; 3]]) -> f64 {
         let (a, b) = (t[k], t[(k + 1) % 3]);
         (a[0] - b[0]).hypot(a[1] - b[1])
     };
-    let sum: f64 = rest.iter().flat_map(|t| [0, 1, 2].map(|k| side(t, k))).sum();
+    let sum: f64 = rest
+        .iter()
+        .flat_map(|t| [0, 1, 2].map(|k| side(t, k)))
+        .sum();
     sum / (3 * rest.len()).max(1) as f64
 }
 

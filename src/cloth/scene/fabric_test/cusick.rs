@@ -17,7 +17,11 @@ pub(super) fn run(
     let place = |(i, p): (usize, &nalgebra::Vector2<f64>)| {
         // Golden ratio sequence: bumps without a period, none between the plates.
         let bump = (i as f64 * 0.618_033_988_75).fract() - 0.5;
-        let height = if i < disc.held { 0.0 } else { settings.bump * bump };
+        let height = if i < disc.held {
+            0.0
+        } else {
+            settings.bump * bump
+        };
         V3d::new(p.x, height, -p.y)
     };
     let specimen = Specimen {

@@ -13,7 +13,7 @@ pub use report::{FabricReading, FabricTestReport};
 use crate::live::{BendingResolution, ClothError};
 use crate::scene::SceneError;
 use crate::settings::{FabricTestSettings, ResolutionSettings};
-use tryon_garment::Fabric;
+use tryon_garment::FabricSample;
 
 /// Textile test.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -41,7 +41,7 @@ pub struct FabricTrial {
     /// Test.
     pub test: FabricTest,
     /// Fabric.
-    pub fabric: Fabric,
+    pub fabric: FabricSample,
     /// Solver.
     pub solver: FabricSolver,
     /// Wanted edge length (m).
@@ -113,9 +113,5 @@ fn carried(
     trial: &FabricTrial,
     rest: &[[[f64; 2]; 3]],
 ) -> (BendingResolution, tryon_garment::Material) {
-    BendingResolution::of(
-        &trial.fabric.material,
-        rest,
-        &ResolutionSettings::default(),
-    )
+    BendingResolution::of(&trial.fabric.material, rest, &ResolutionSettings::default())
 }

@@ -64,7 +64,8 @@ pub(super) fn run(
         quantity: "shear stiffness",
         unit: "N/m",
         measured: force / (SIDE * angle),
-        published: Some(trial.fabric.material.shear).filter(|_| !trial.fabric.is_estimated("shear")),
+        published: Some(trial.fabric.material.shear)
+            .filter(|_| !trial.fabric.is_estimated("shear")),
         origin: "of the same fabric",
     });
     Ok(report)

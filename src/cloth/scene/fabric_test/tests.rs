@@ -2,7 +2,7 @@
 
 use super::{FabricSolver, FabricTest, FabricTestReport, FabricTrial};
 use crate::settings::FabricTestSettings;
-use tryon_garment::Fabric;
+use tryon_garment::FabricSample;
 
 /// Silk, cotton, twill, denim of 13 oz, jersey, wool.
 const FABRICS: [&str; 6] = ["silk", "cotton", "twill", "denim", "jersey", "wool"];
@@ -10,7 +10,7 @@ const FABRICS: [&str; 6] = ["silk", "cotton", "twill", "denim", "jersey", "wool"
 fn trial(test: FabricTest, fabric: &str, solver: FabricSolver, edge: f64) -> FabricTestReport {
     let trial = FabricTrial {
         test,
-        fabric: Fabric::named(fabric).expect("a fabric"),
+        fabric: FabricSample::named(fabric).expect("a fabric"),
         solver,
         edge,
     };
@@ -18,7 +18,10 @@ fn trial(test: FabricTest, fabric: &str, solver: FabricSolver, edge: f64) -> Fab
 }
 
 fn worst(report: &FabricTestReport) -> f64 {
-    let errors = report.readings.iter().filter_map(super::FabricReading::error);
+    let errors = report
+        .readings
+        .iter()
+        .filter_map(super::FabricReading::error);
     errors.fold(0.0, |w, e| w.max(e.abs()))
 }
 
@@ -27,7 +30,12 @@ fn strips_have_the_published_bending_length() {
     for fabric in FABRICS {
         let offline = trial(FabricTest::Cantilever, fabric, FabricSolver::Offline, 3e-3);
         assert!(worst(&offline) < 0.03 && offline.settled, "{offline}");
-        let live = trial(FabricTest::Cantilever, fabric, FabricSolver::Realtime, 0.012);
+        let live = trial(
+            FabricTest::Cantilever,
+            fabric,
+            FabricSolver::Realtime,
+            0.012,
+        );
         assert!(worst(&live) < 0.12 && live.settled, "{live}");
     }
 }
@@ -39,7 +47,12 @@ fn coarse_meshes_report_their_limit() {
     let limit = silk.resolution.expect("a limit");
     assert!(limit.stiffening() > 1.5, "{limit:?}");
     assert!(silk.to_string().contains("least bending"), "{silk}");
-    let denim = trial(FabricTest::Cantilever, "denim", FabricSolver::Realtime, 0.02);
+    let denim = trial(
+        FabricTest::Cantilever,
+        "denim",
+        FabricSolver::Realtime,
+        0.02,
+    );
     let limit = denim.resolution.expect("a limit");
     assert!(limit.stiffening() == 1.0 && worst(&denim) < 0.1, "{denim}");
 }
@@ -65,11 +78,13 @@ fn cotton_drapes_as_published() {
 fn faults_are_told() {
     let trial = FabricTrial {
         test: FabricTest::Cusick,
-        fabric: Fabric::named("wool").expect("a fabric"),
+        fabric: FabricSample::named("wool").expect("a fabric"),
         solver: FabricSolver::Offline,
         edge: 0.5,
     };
-    let why = trial.run(&FabricTestSettings::default()).expect_err("too coarse");
+    let why = trial
+        .run(&FabricTestSettings::default())
+        .expect_err("too coarse");
     assert!(why.to_string().contains("edge"), "{why}");
     assert!(FabricTest::named("heart-loop").is_none());
 }

@@ -48,7 +48,8 @@ impl FineProgress {
         }
         if let Some(motion) = self.moving.take() {
             let moved = motion * 1e3;
-            let text = format!("tryon: the cloth is not at rest: a vertex moves {moved:.1} mm in a step");
+            let text =
+                format!("tryon: the cloth is not at rest: a vertex moves {moved:.1} mm in a step");
             self.bar.suspend(|| eprintln!("{text}"));
         }
         if message.frame_count > 0 {
