@@ -4,7 +4,7 @@ use super::bending::{Hinge, HingeSide, Wing};
 use super::membrane::Membrane;
 use super::resolution::BendingResolution;
 use crate::live::ClothError;
-use crate::settings::ResolutionSettings;
+use crate::settings::{AirSettings, ResolutionSettings};
 use nalgebra::Matrix3x2;
 use tryon_garment::{Bending, Material};
 use tryon_geometry::math::order_statistics::percentile;
@@ -65,8 +65,10 @@ pub struct Sheet {
     pub membrane: Membrane,
     /// Edges with their rest lengths (m).
     pub edges: Vec<([u32; 2], f64)>,
-    /// Rate of air drag (1/s).
+    /// Damping rate (1/s).
     pub damping: f64,
+    /// Drag of the air, ½ ρ C (kg/m³); zero in a vacuum.
+    pub air: f64,
     /// Coulomb coefficient.
     pub friction: f64,
 }
@@ -115,17 +117,21 @@ impl Sheet {
             membrane: Membrane::new(material),
             edges,
             damping: material.damping,
+            air: 0.0,
             friction: material.friction,
         })
     }
-    /// Sheet of a garment, with the bending that its edges carry ([`BendingResolution`]).
+    /// Sheet of a garment in still air, with the bending that its edges carry ([`BendingResolution`]).
     ///
     /// # Errors
     /// As [`Sheet::new`].
     pub fn of_garment(g: &tryon_garment::GarmentMesh) -> Result<Self, ClothError> {
         let settings = ResolutionSettings::default();
         let (_, carried) = BendingResolution::of(&g.material, &g.rest, &settings);
-        Self::new(g.vertices, &g.faces, &g.rest, &carried, None)
+        let mut sheet = Self::new(g.vertices, &g.faces, &g.rest, &carried, None)?;
+        let air = AirSettings::default();
+        sheet.air = 0.5 * air.density * air.drag;
+        Ok(sheet)
     }
     /// Elastic energy (J).
     pub fn energy(&self, x: &[V3d]) -> f64 {

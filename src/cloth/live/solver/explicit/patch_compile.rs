@@ -112,6 +112,7 @@ impl StableSheet {
             islands: islands.clone(),
             vertices: set.clone(),
             damping: self.damping,
+            air: self.air,
         }
     }
 }

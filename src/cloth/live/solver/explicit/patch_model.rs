@@ -57,6 +57,8 @@ pub struct PatchModel {
     pub(super) bent: Vec<HingeBlock>,
     pub(super) diagonals: Vec<Diagonal>,
     pub(super) damping: f32,
+    /// Drag of the air, ½ ρ C (kg/m³).
+    pub(super) air: f32,
 }
 
 impl PatchModel {

@@ -172,3 +172,24 @@ fn curved_rest_shape_is_an_equilibrium() {
     let moved = distance(&lab.positions(), &x);
     assert!(moved < 1e-3, "{moved}");
 }
+
+#[test]
+fn sheet_that_falls_flat_in_air_has_its_closed_form() {
+    // v = v₀ tanh(g t/v₀) with ρ g = k v₀².
+    const AIR: f64 = 0.7;
+    let (x, faces, rest) = grid(4, 4, 0.02, 0.02);
+    let mut falling = sheet(&faces, &rest, x.len(), &cotton(1e-5));
+    falling.air = AIR;
+    for patches in [1, 2] {
+        let h = 2e-4;
+        let mut lab = Lab::new(falling.clone(), &x, h, patches);
+        lab.run(5_000, &[]);
+        let fallen = -lab.positions()[12].y;
+        let terminal = (0.18 * 9.81 / AIR).sqrt();
+        let expected = terminal * terminal / 9.81 * (9.81 / terminal).cosh().ln();
+        assert!(
+            (fallen / expected - 1.0).abs() < 0.01,
+            "{fallen} {expected}"
+        );
+    }
+}
