@@ -41,7 +41,9 @@ pub(super) fn run(
             quantity,
             unit: "mm",
             measured: 1e3 * overhang * bending_length_of(-mean.y / mean.x),
-            published: Some(1e3 * published(&material.bending, along, load, overhang)),
+            // A law measured by curvature has no one rigidity.
+            published: (material.measured.is_none())
+                .then(|| 1e3 * published(&material.bending, along, load, overhang)),
             origin: "Peirce's reading of the published B, HB and weight",
         });
     }
