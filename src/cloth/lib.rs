@@ -32,7 +32,8 @@
 //! - XPBD: [`mod@live::solver::xpbd`].
 //! - Skin contact: [`mod@live::contact::body_contact`].
 //! - Cloth on cloth: [`mod@live::contact::pair_contact`].
-//! - Folds of one garment: [`mod@live::contact::self_contact`].
+//! - Near pairs of features: [`mod@live::contact::near_candidates`], [`mod@live::contact::near_pairs`]; a hood that is put on:
+//!   [`mod@live::contact::self_contact`].
 //! - Islands that sleep and wake: [`mod@live::sleep::islands`].
 //! - Thresholds: [`mod@live::sleep::criteria`].
 //! - Motion that wakes: [`mod@live::sleep::wake_source`].
@@ -45,6 +46,7 @@
 //! - Energy, gradient, Hessian of a whole sheet: [`mod@elastic::model`], summed by [`mod@elastic::assembly`].
 //! - Membrane (Volino et al. 2009): [`mod@elastic::membrane`], laws: [`mod@elastic::stretch_law`],
 //!   [`mod@elastic::bend_law`].
+//! - Tension curves and loading curves of KES: [`mod@elastic::tension_law`], [`mod@elastic::loading_bend`].
 //! - Those of measured fabrics (Wang et al. 2011): [`mod@elastic::measured_stretch`], [`mod@elastic::measured_bend`].
 //! - Dihedral angles: [`mod@elastic::dihedral`].
 //! - A curvature tensor a vertex from the angles around it: [`mod@elastic::curvature_set`], its weights:
@@ -62,12 +64,14 @@
 //! - Skin that yields: [`mod@fine::obstacle`].
 //! - Repair of a start: [`mod@fine::start`].
 //! - Static drape: [`mod@fine::drape`].
+//! - Drag of still air: [`mod@fine::air_drag`].
 //! - Whole animations: [`mod@fine::animation`], [`mod@fine::checkpoint`].
 //! - Garments as one cloth: [`mod@fine::garment_cloth`].
 //!
 //! Scenes, one sheet among moving solids:
 //!
 //! - Files: [`mod@scene::file`].
+//! - Textile tests: [`mod@scene::fabric_test`] on [`mod@specimens`].
 //! - By the live step: [`mod@scene::live_run`]; by the offline one: [`mod@scene::fine_run`].
 #![allow(rustdoc::private_intra_doc_links)] // the index of ideas names private modules
 
@@ -77,9 +81,10 @@ pub mod fine;
 pub mod live;
 pub mod scene;
 pub mod settings;
+mod specimens;
 
 pub use live::{
-    AnchorBinding, ClothError, Config, Element, GarmentState, Hinge, Input, Model, Outfit, Sheet,
-    StagesMs, State, StepReport, Workspace, WornReference, collision_model, model, self_contact,
-    sleeve_rings, solver, step, untangler,
+    AnchorBinding, BendingResolution, ClothError, Config, Element, GarmentState, Hinge, Input,
+    Model, Outfit, Sheet, StagesMs, State, StepReport, Workspace, WornReference, collision_model,
+    model, self_contact, sleeve_rings, solver, step, untangler,
 };

@@ -2,7 +2,7 @@
 
 use super::FormatError;
 use super::image::read_limited;
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 use std::path::Path;
 
 /// Largest file, bytes; a fabric has 1 kB.
@@ -11,7 +11,7 @@ const MAX_BYTES: u64 = 1 << 20;
 const SHAPES: [(&str, usize, usize); 2] = [("stretching", 6, 4), ("bending", 3, 5)];
 
 /// Measured fabric.
-#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct MeasuredFabric {
     /// Mass of a square metre, kg/m².
     pub density: f64,

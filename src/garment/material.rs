@@ -1,6 +1,6 @@
 //! Fabric in SI units.
 
-use super::GarmentError;
+use super::{Bending, GarmentError, Tensile};
 use serde::{Deserialize, Serialize};
 use tryon_formats::fabric_json::MeasuredFabric;
 
@@ -20,8 +20,14 @@ pub struct Material {
     pub shear: f64,
     /// Coupling of the two directions (2D Lamé λ), N/m.
     pub coupling: f64,
-    /// Bending rigidity, N·m.
-    pub bending: f64,
+    /// Bending rigidity by direction, N·m.
+    pub bending: Bending,
+    /// Tension curves, for the offline solver; the stiffness above is theirs at rest.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub tensile: Option<Tensile>,
+    /// Measured law, for the offline solver, instead of all moduli above.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub measured: Option<Box<MeasuredFabric>>,
     /// Coulomb coefficient against skin.
     pub friction: f64,
     /// Damping rate by air and internal losses, 1/s.
@@ -59,17 +65,20 @@ impl Material {
             stretch_weft: membrane,
             shear: membrane / (2.0 * (1.0 + poisson)),
             coupling: membrane * poisson / (1.0 - poisson * poisson),
-            bending: membrane * thickness * thickness / (12.0 * (1.0 - poisson * poisson)),
+            bending: Bending::uniform(
+                membrane * thickness * thickness / (12.0 * (1.0 - poisson * poisson)),
+            ),
+            tensile: None,
+            measured: None,
             friction: 0.3,
             damping: 0.5,
             thickness,
             source: source.to_owned(),
         }
     }
-    /// Linear sheet from a fabric measured as by Wang et al. 2011, whose stiffness depends on direction and strain.
-    /// Each modulus is the mean of its values at rest and at the largest strain along its direction (weft, warp, bias).
-    /// Bending is that of the smallest curvature, averaged over directions. Friction, damping and thickness are
-    /// estimates.
+    /// Fabric measured as by Wang et al. 2011, whose stiffness depends on direction and strain, with a linear sheet for
+    /// the real-time solver. Each modulus is the mean of its values at rest and at the largest strain along its direction
+    /// (weft, warp, bias). Bending is that of the smallest curvature. Friction, damping and thickness are estimates.
     ///
     /// # Errors
     /// As [`Self::check`].
@@ -88,12 +97,11 @@ impl Material {
         let mean = |row: usize, column: usize| (0.5 * (at(0, column) + at(row, column))).max(LEAST);
         let (weft, warp, shear) = (mean(1, 0), mean(5, 2), mean(3, 3));
         let coupling = (0.5 * (at(0, 1) + at(3, 1))).clamp(0.0, COUPLING * (weft * warp).sqrt());
-        let first: Vec<f64> = m
-            .bending
-            .iter()
-            .filter_map(|r| r.first())
-            .map(|b| b.max(0.0))
-            .collect();
+        // Rows are bent about the weft, the bias and the warp, and curve across these.
+        let bend = |row: usize| {
+            let first = m.bending.get(row).and_then(|r| r.first());
+            first.map_or(0.0, |b| b.max(0.0))
+        };
         let material = Self {
             name: name.to_owned(),
             area_density: m.density,
@@ -101,7 +109,14 @@ impl Material {
             stretch_weft: weft,
             shear,
             coupling,
-            bending: first.iter().sum::<f64>() / first.len().max(1) as f64,
+            bending: Bending {
+                warp: bend(0),
+                weft: bend(2),
+                bias: Some(bend(1)),
+                friction: 0.0,
+            },
+            tensile: None,
+            measured: Some(Box::new(m.clone())),
             friction: 0.3,
             damping: 1.0,
             thickness: 5e-4,
@@ -120,6 +135,11 @@ impl Material {
         const MOST: f64 = 0.12;
         (TENSION / self.stretch_warp.min(self.stretch_weft)).min(MOST)
     }
+    /// Geometric mean of both Poisson ratios ν, of ν/(1 − ν²) = λ/√(E₁ E₂).
+    pub fn poisson(&self) -> f64 {
+        let ratio = self.coupling / (self.stretch_warp * self.stretch_weft).sqrt();
+        2.0 * ratio / (1.0 + (1.0 + 4.0 * ratio * ratio).sqrt())
+    }
     /// Checks that all numbers are possible for a sheet.
     ///
     /// # Errors
@@ -133,15 +153,21 @@ impl Material {
         ];
         let not_negative = [
             ("coupling", self.coupling),
-            ("bending", self.bending),
             ("friction", self.friction),
             ("damping", self.damping),
             ("thickness", self.thickness),
         ];
+        let bending = self.bending.fields();
+        let curves = self.tensile.iter().flat_map(|t| [t.warp, t.weft]);
+        let curves: Vec<_> = curves.flat_map(|c| c.fields()).collect();
         for (field, v, ok) in positive
             .iter()
+            .chain(&curves)
             .map(|(f, v)| (f, v, *v > 0.0))
-            .chain(not_negative.iter().map(|(f, v)| (f, v, *v >= 0.0)))
+            .chain({
+                let rest = not_negative.iter().chain(&bending);
+                rest.map(|(f, v)| (f, v, *v >= 0.0))
+            })
         {
             if !ok || !v.is_finite() {
                 return Err(GarmentError::Field {

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 use tryon_body::measure::Measurements;
 use tryon_dressing::{FinishedGarment, GarmentSource, MeshGarment, suggest};
-use tryon_garment::{FabricImage, GarmentError, Pattern, Size, library};
+use tryon_garment::{FabricImage, GarmentError, Material, Pattern, Size, library};
 
 /// One garment chosen for a person.
 #[derive(Clone, Debug)]
@@ -24,6 +24,13 @@ pub enum Choice {
         /// Size; `None` for the suggested one. A garment in one size is made to measure.
         size: Option<Size>,
     },
+    /// Garment of the library or pattern, cut from another fabric than its own.
+    InFabric {
+        /// Garment.
+        garment: Box<Choice>,
+        /// Fabric.
+        material: Box<Material>,
+    },
 }
 
 impl Choice {
@@ -37,6 +44,18 @@ impl Choice {
             name: name.to_owned(),
             size,
         })
+    }
+
+    /// The garment cut from `material`; a mesh garment has its fabric from its making.
+    #[must_use]
+    pub fn in_fabric(self, material: &Material) -> Self {
+        match self {
+            Self::Mesh { .. } => self,
+            _ => Self::InFabric {
+                garment: Box::new(self),
+                material: Box::new(material.clone()),
+            },
+        }
     }
 
     /// Mesh garment; a size is ignored by a garment in one size.
@@ -59,6 +78,13 @@ impl Choice {
         Ok(match self {
             Self::Pattern(pattern) => cut(pattern.clone(), Vec::new()),
             Self::Mesh { garment, size } => sized_mesh(garment, *size, body),
+            Self::InFabric { garment, material } => {
+                let mut sized = garment.sized(body)?;
+                if let WornItem::Pattern(pattern) = &mut sized.item {
+                    pattern.material = (**material).clone();
+                }
+                sized
+            }
             Self::Library {
                 name,
                 size: Some(size),

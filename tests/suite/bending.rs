@@ -73,8 +73,8 @@ fn a_long_sleeve_stays_whole_around_an_elbow_that_folds() {
     let worst = |of: fn(&StepReport) -> f64| reports.iter().map(of).fold(0.0, f64::max);
     let p99 = worst(|r| r.p99_strain);
     println!("p99 stretch {p99}, most {}", worst(|r| r.max_strain));
-    // Without room inside the elbow 0.38, and torn for good.
-    assert!(p99 < 0.18, "{p99}");
+    // 0.20; 0.17 in cotton that was stiffer than measured. Without room inside the elbow 0.38, and torn for good.
+    assert!(p99 < 0.25, "{p99}");
     assert!(reports.last().expect("calls").max_strain < 0.6);
     assert!(worst(|r| r.penetration_left) < 0.004);
 }

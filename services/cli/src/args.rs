@@ -20,6 +20,7 @@ pub(crate) use token::{
     TokenRedeemArgs, TokenRevokeArgs, TokenWhat,
 };
 
+use crate::input::GivenChoice;
 use clap::{Args, Parser, Subcommand};
 use std::path::PathBuf;
 
@@ -93,6 +94,9 @@ pub(crate) struct RunArgs {
     /// its base mesh with the helpers). Without it the garment's own place and size are guessed from.
     #[arg(long, value_name = "NPZ|OBJ")]
     pub(crate) garment_body: Option<PathBuf>,
+    /// Fabric of all garments instead of their own: a preset's name, a file measured as by Wang et al. 2011, or a material.
+    #[arg(long, value_name = "NAME|FILE")]
+    pub(crate) fabric: Option<String>,
     /// Size for all garments but pattern files and meshes on a guessed body; without it each is chosen from the tracked
     /// body.
     #[arg(long, value_name = "SIZE")]
@@ -124,6 +128,17 @@ pub(crate) struct RunArgs {
     pub(crate) threads: usize,
 }
 
+impl RunArgs {
+    /// Choices for all garments.
+    pub(crate) fn given(&self) -> GivenChoice<'_> {
+        GivenChoice {
+            size: self.size.as_deref(),
+            body: self.garment_body.as_deref(),
+            fabric: self.fabric.as_deref(),
+        }
+    }
+}
+
 #[derive(Debug, Args)]
 pub(crate) struct TrackArgs {
     /// An .mcap file, or a folder with camera.json and depth/.
@@ -152,9 +167,16 @@ pub(crate) struct TrackArgs {
 
 #[derive(Debug, Args)]
 pub(crate) struct SimulateArgs {
-    /// Scene file: mesh, pinned vertices, colliders, material, duration.
-    #[arg(long, value_name = "SCENE.json")]
+    /// Scene file: mesh, pinned vertices, colliders, material, duration; or a textile test: cantilever, cusick or
+    /// picture-frame.
+    #[arg(long, value_name = "SCENE.json|TEST")]
     pub(crate) scene: PathBuf,
+    /// Fabric of a textile test: a preset's name, a file measured as by Wang et al. 2011, or a material.
+    #[arg(long, value_name = "NAME|FILE", default_value = "cotton")]
+    pub(crate) fabric: String,
+    /// Edge length of a textile test (m).
+    #[arg(long, value_name = "M", default_value_t = 0.005)]
+    pub(crate) edge: f64,
     /// Solver, checkpoint.
     #[command(flatten)]
     pub(crate) solver: SolverArgs,

@@ -8,10 +8,11 @@ use std::sync::Arc;
 use std::time::Duration;
 use tryon::body::{Template, embedded, import::template_from_smpl};
 use tryon::dressing::{MeshGarment, MeshGarmentSettings, SourceBody};
+use tryon::formats::fabric_json::parse_fabric;
 use tryon::formats::garmentcode::{is_garmentcode, parse_garmentcode};
 use tryon::formats::npz::read_smpl;
 use tryon::garment::import::from_garmentcode;
-use tryon::garment::{Material, Pattern, Size, Triangulation};
+use tryon::garment::{FabricSample, Material, Pattern, Size, Triangulation};
 use tryon::mirror::{CapturedWardrobe, Choice};
 
 /// Body to track: an SMPL-layout npz, or the embedded one.
@@ -55,18 +56,16 @@ pub(crate) fn pattern(path: &Path) -> Result<Pattern> {
     .with_context(|| path.display().to_string())
 }
 
-/// Garments by library name, pattern file, mesh file or capture; `size` for all but pattern files, `body` under the
-/// mesh files.
+/// Garments by library name, pattern file, mesh file or capture; with what is `given` for all of them.
 ///
 /// # Errors
-/// Names the unknown garment or size, or the fault in a file.
-pub(crate) fn choices(
-    names: &[String],
-    size: Option<&str>,
-    body: Option<&Path>,
-) -> Result<Vec<Choice>> {
-    let size = size.map(str::parse::<Size>).transpose()?;
-    let body = body
+/// Names the unknown garment, size or fabric, or the fault in a file.
+pub(crate) fn choices(names: &[String], given: &GivenChoice<'_>) -> Result<Vec<Choice>> {
+    let size = given.size.map(str::parse::<Size>).transpose()?;
+    let own = given.fabric.map(fabric).transpose()?.map(|f| f.material);
+    let cotton = Material::preset("cotton")?;
+    let material = own.as_ref().unwrap_or(&cotton);
+    let body = (given.body)
         .map(SourceBody::read)
         .transpose()
         .context("--garment-body")?;
@@ -74,17 +73,60 @@ pub(crate) fn choices(
     for name in names {
         let path = Path::new(name);
         if let Some((folder, own)) = capture(path) {
-            let garments = captured_garments(folder, own)?;
+            let garments = captured_garments(folder, own, material)?;
             chosen.extend(garments.into_iter().map(|g| Choice::mesh(g, size)));
         } else if name.ends_with(".json") {
             chosen.push(Choice::Pattern(Box::new(pattern(path)?)));
         } else if is_mesh(path) {
-            chosen.push(Choice::mesh(mesh_garment(path, body.clone())?, size));
+            chosen.push(Choice::mesh(
+                mesh_garment(path, body.clone(), material)?,
+                size,
+            ));
         } else {
             chosen.push(Choice::library(name, size)?);
         }
     }
-    Ok(chosen)
+    Ok(match &own {
+        Some(m) => chosen.into_iter().map(|c| c.in_fabric(m)).collect(),
+        None => chosen,
+    })
+}
+
+/// Choices for all garments; those without a value are found for each.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct GivenChoice<'a> {
+    /// Size, but of pattern files.
+    pub(crate) size: Option<&'a str>,
+    /// Body under the mesh files.
+    pub(crate) body: Option<&'a Path>,
+    /// Fabric: a preset's name or a file.
+    pub(crate) fabric: Option<&'a str>,
+}
+
+/// Fabric by a preset's name or from a file: measured as by Wang et al. 2011, or a material.
+///
+/// # Errors
+/// Lists the presets, or names the fault in the file.
+pub(crate) fn fabric(name: &str) -> Result<FabricSample> {
+    let path = Path::new(name);
+    if !name.ends_with(".json") {
+        return Ok(FabricSample::named(name)?);
+    }
+    let text =
+        std::fs::read_to_string(path).with_context(|| format!("cannot read {}", path.display()))?;
+    let stem = path
+        .file_stem()
+        .and_then(|s| s.to_str())
+        .unwrap_or("fabric");
+    let material = if text.contains("\"stretching\"") && !text.contains("\"measured\"") {
+        Material::from_measured(stem, &parse_fabric(&text, path)?)?
+    } else {
+        serde_json::from_str(&text).with_context(|| path.display().to_string())?
+    };
+    material
+        .check()
+        .with_context(|| path.display().to_string())?;
+    Ok(FabricSample::of_material(material))
 }
 
 /// Folder of a capture, and the name of the one garment of it where the path is `FOLDER/NAME`.
@@ -97,8 +139,12 @@ fn capture(path: &Path) -> Option<(&Path, Option<&str>)> {
     is_garment.then_some((folder, Some(own)))
 }
 
-/// Cotton garments of a capture: all, or one by name.
-fn captured_garments(folder: &Path, own: Option<&str>) -> Result<Vec<MeshGarment>> {
+/// Garments of a capture, of `material`: all, or one by name.
+fn captured_garments(
+    folder: &Path,
+    own: Option<&str>,
+    material: &Material,
+) -> Result<Vec<MeshGarment>> {
     let captured = CapturedWardrobe::read(folder, &embedded::template())?;
     let names = captured.names();
     let is_wanted = |k: &usize| own.is_none_or(|own| names[*k] == own);
@@ -111,11 +157,10 @@ fn captured_garments(folder: &Path, own: Option<&str>) -> Result<Vec<MeshGarment
         names.join(", ")
     );
     let edge = Triangulation::default().edge_length;
-    let cotton = Material::preset("cotton")?;
     let title = folder.file_name().unwrap_or_default().to_string_lossy();
     let garment = |k: usize| {
         let name = format!("{title}_{}", names[k]);
-        let made = captured.garment(k, &name, &cotton, edge);
+        let made = captured.garment(k, &name, material, edge);
         made.with_context(|| format!("{}: {}", folder.display(), names[k]))
     };
     wanted.into_iter().map(garment).collect()
@@ -128,10 +173,10 @@ fn is_mesh(path: &Path) -> bool {
         .is_some_and(|e| ENDINGS.contains(&e.to_ascii_lowercase().as_str()))
 }
 
-/// Mesh garment of cotton, made on `body`, which is guessed when absent.
-fn mesh_garment(path: &Path, body: Option<SourceBody>) -> Result<MeshGarment> {
+/// Mesh garment of `material`, made on `body`, which is guessed when absent.
+fn mesh_garment(path: &Path, body: Option<SourceBody>, material: &Material) -> Result<MeshGarment> {
     let settings = MeshGarmentSettings::with_edge(Triangulation::default().edge_length);
-    MeshGarment::read_on(path, body, &Material::preset("cotton")?, &settings)
+    MeshGarment::read_on(path, body, material, &settings)
         .with_context(|| path.display().to_string())
 }
 

@@ -39,8 +39,7 @@ impl Preview {
     /// # Errors
     /// Bad input, named.
     pub(crate) fn open(args: &RunArgs) -> Result<Self> {
-        let body = args.garment_body.as_deref();
-        let choices = input::choices(&args.garments, args.size.as_deref(), body)?;
+        let choices = input::choices(&args.garments, &args.given())?;
         let mut source = open_recording(&args.input)?;
         let template = input::template(args.body.as_deref())?;
         let mirror = Mirror::new(template, source.calibration(), choices);

@@ -224,8 +224,8 @@ impl FanCurvature {
 #[cfg(test)]
 mod tests {
     use super::super::edges::interior_edges;
-    use super::super::tests::strips::{StripPattern, TestStrip, strip};
     use super::*;
+    use crate::specimens::strip::{StripMesh, StripPattern, strip};
     use nalgebra::{DMatrix, Rotation2, Vector2};
     use tryon_geometry::math::V3d;
 
@@ -242,7 +242,7 @@ mod tests {
         CurvatureSet::new(rest, &triangles, &edges, &law.at_rest())
     }
 
-    fn mesh(pattern: StripPattern) -> (TestStrip, RestSheet) {
+    fn mesh(pattern: StripPattern) -> (StripMesh, RestSheet) {
         let s = strip(1.0, 8, 4, pattern);
         let rest = RestSheet::flat(s.faces.clone(), &s.at).expect("faces");
         (s, rest)
@@ -253,7 +253,7 @@ mod tests {
     }
 
     /// Height field of a small constant curvature (κᵤᵤ, κᵥᵥ, 2 κᵤᵥ).
-    fn curved(s: &TestStrip, z: &Vector3<f64>) -> Vec<V3d> {
+    fn curved(s: &StripMesh, z: &Vector3<f64>) -> Vec<V3d> {
         let height = |p: &Vector2<f64>| {
             0.5 * (z[0] * p.x * p.x + z[1] * p.y * p.y + z[2] * p.x * p.y) + 1e-4 * p.x
         };

@@ -27,15 +27,22 @@ pub struct SheetMotion<'a> {
     pub now: &'a [V3d],
     /// Vertices that stay where they are, at least; empty for none. Elements of these alone are left out.
     pub asleep: &'a [bool],
+    /// Length of the step (s), infinite for sheets outside time.
+    pub step: f64,
 }
 
 impl<'a> SheetMotion<'a> {
     /// Sheet that has not moved: angles lie in (−π, π].
     pub fn still(x: &'a [V3d]) -> Self {
+        Self::moved(x, x)
+    }
+    /// Sheet that moved, all of it, outside time.
+    pub fn moved(start: &'a [V3d], now: &'a [V3d]) -> Self {
         Self {
-            start: x,
-            now: x,
+            start,
+            now,
             asleep: &[],
+            step: f64::INFINITY,
         }
     }
     /// True for an element that is left out; a corner that it lacks, beyond all vertices, keeps nothing awake.

@@ -2,9 +2,10 @@
 
 use super::measured_bend::MeasuredBend;
 use super::measured_stretch::MeasuredStretch;
-use super::{BendLaw, ElasticError, StretchLaw};
+use super::{BendLaw, ElasticError, StretchLaw, Stretching, TensionLaw};
 use crate::settings::ElasticSettings;
 use tryon_formats::fabric_json::MeasuredFabric;
+use tryon_garment::Material;
 
 /// Constitutive laws and mass of a sheet, u along the weft and v along the warp.
 #[derive(Clone, Debug, PartialEq)]
@@ -18,6 +19,31 @@ pub struct ElasticFabric {
 }
 
 impl ElasticFabric {
+    /// Laws of a material: measured ones where it has them, else linear ones of its moduli.
+    ///
+    /// Tension curves come with bending by direction and without its Poisson effect: KES-FB2 bends strips 20 times as wide
+    /// as long to cylinders, and yarns slide rather than contract.
+    pub fn of_material(material: &Material) -> Self {
+        if let Some(measured) = &material.measured {
+            return Self::measured(measured);
+        }
+        let poisson = material.poisson();
+        let strips = [material.stretch_weft, material.stretch_warp];
+        let at_rest = Stretching::orthotropic(strips, poisson, material.shear);
+        let (stretch, bent) = match &material.tensile {
+            Some(t) => {
+                let curves = [t.weft, t.warp].map(|c| c.cubic());
+                let law = Box::new(TensionLaw::new(at_rest, curves));
+                (StretchLaw::Tension(law), 0.0)
+            }
+            None => (StretchLaw::Linear(at_rest), poisson),
+        };
+        Self {
+            area_density: material.area_density,
+            stretch,
+            bend: BendLaw::orthotropic(&material.bending, bent),
+        }
+    }
     /// Fabric measured as by Wang, O'Brien & Ramamoorthi 2011.
     pub fn measured(fabric: &MeasuredFabric) -> Self {
         let settings = ElasticSettings::default();

@@ -7,6 +7,7 @@ use super::targets::{FrameScript, FrameTargets, StepTargets};
 use crate::settings::DrapeSettings;
 use crate::settings::TimeScheme;
 use serde::{Deserialize, Serialize};
+use std::fmt;
 use std::ops::ControlFlow;
 use tryon_geometry::math::V3d;
 
@@ -19,10 +20,30 @@ pub struct DrapeReport {
     pub unsolved: usize,
     /// Largest motion of a vertex in the last step (m).
     pub motion: f64,
+    /// That vertex.
+    pub vertex: usize,
+    /// Its mean speed in that step (m/s).
+    pub speed: f64,
     /// True if the last step was of the longest length and within the tolerance.
     pub settled: bool,
     /// Newton's work.
     pub newton: NewtonReport,
+}
+
+impl fmt::Display for DrapeReport {
+    /// Rest, or the vertex that moves most.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if self.settled {
+            return write!(f, "at rest after {} steps", self.steps);
+        }
+        write!(
+            f,
+            "not at rest after {} steps: vertex {} moves at {:.1} mm/s",
+            self.steps,
+            self.vertex,
+            self.speed * 1e3
+        )
+    }
 }
 
 impl OfflineSolver<'_> {
@@ -104,7 +125,8 @@ impl OfflineSolver<'_> {
                 self.accept(solved, *h, self.state.time);
                 report.steps += 1;
                 let moved = self.motion_since(&before);
-                report.motion = largest(&moved).1;
+                (report.vertex, report.motion) = largest(&moved);
+                report.speed = report.motion / *h;
                 let is_calm = mean(&moved) <= drape.tolerance
                     && report.motion <= drape.largest * drape.tolerance;
                 report.settled = is_calm && *h >= drape.steps[1];

@@ -16,10 +16,10 @@ pub trait EnergyElements<const V: usize, const N: usize>: Send + Sync {
     fn count(&self) -> usize;
     /// Vertices of an element, in the order of its unknowns.
     fn vertices(&self, element: usize) -> [u32; V];
-    /// Energy (J) at positions `x` (m).
-    fn value(&self, element: usize, x: &[V3d]) -> f64;
+    /// Energy (J) within a step.
+    fn value(&self, element: usize, at: &SheetMotion<'_>) -> f64;
     /// Energy with its derivatives; the Hessian is positive semi-definite.
-    fn expand(&self, element: usize, x: &[V3d]) -> ElementEnergy<N>;
+    fn expand(&self, element: usize, at: &SheetMotion<'_>) -> ElementEnergy<N>;
 }
 
 /// Energy that adds itself to a system on a [`BlockPattern`].
@@ -95,7 +95,7 @@ impl<S: EnergyElements<V, N>, const V: usize, const N: usize> EnergyTerm for Ele
             if at.is_asleep(&self.set.vertices(k)) {
                 return 0.0;
             }
-            self.set.value(k, at.now)
+            self.set.value(k, at)
         })
     }
 
@@ -114,7 +114,7 @@ impl<S: EnergyElements<V, N>, const V: usize, const N: usize> EnergyTerm for Ele
                 if at.is_asleep(&self.set.vertices(first + k)) {
                     return ElementEnergy::default();
                 }
-                self.set.expand(first + k, at.now)
+                self.set.expand(first + k, at)
             });
             for (k, energy) in batch.iter().enumerate() {
                 sum += energy.value;

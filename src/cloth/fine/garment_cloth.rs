@@ -1,30 +1,18 @@
 //! Sewn garments as cloth of the offline solver: all in one index space, each of its own fabric.
 
 use super::{
-    ElasticTerm, ElementTerm, EnergyTerm, OfflineCloth, OfflineError, StitchSprings, sewn_pairs,
+    AirDrag, ElasticTerm, ElementTerm, EnergyTerm, OfflineCloth, OfflineError, StitchSprings,
+    sewn_pairs,
 };
-use crate::elastic::{BendLaw, ClothModel, ElasticFabric, RestSheet, StretchLaw, Stretching};
+use crate::elastic::{ClothModel, ElasticFabric, RestSheet};
+use crate::settings::AirSettings;
 use nalgebra::Vector2;
 use tryon_garment::{GarmentMesh, Material};
 use tryon_geometry::math::V3d;
 use tryon_geometry::mesh::Face;
 
-/// Laws of an orthotropic sheet of these moduli; bending is isotropic.
-pub(crate) fn fabric_of(material: &Material) -> ElasticFabric {
-    let strips = [material.stretch_weft, material.stretch_warp];
-    // ν / (1 − ν²) = λ / √(E₁ E₂).
-    let ratio = material.coupling / (strips[0] * strips[1]).sqrt();
-    let poisson = 2.0 * ratio / (1.0 + (1.0 + 4.0 * ratio * ratio).sqrt());
-    let stretch = Stretching::orthotropic(strips, poisson, material.shear);
-    ElasticFabric {
-        area_density: material.area_density,
-        stretch: StretchLaw::Linear(stretch),
-        bend: BendLaw::isotropic(material.bending, poisson),
-    }
-}
-
 impl OfflineCloth {
-    /// Garments, flat at rest as cut, their vertices one after another.
+    /// Garments in still air, flat at rest as cut, their vertices one after another.
     ///
     /// # Errors
     /// Names the face or modulus at fault; a vertex without a face has no mass.
@@ -43,12 +31,14 @@ impl OfflineCloth {
                     .collect(),
                 folded: None,
             };
-            let fabric = fabric_of(&garment.material);
+            let fabric = ElasticFabric::of_material(&garment.material);
             let model = ClothModel::new(&rest, count, fabric)?;
             for (sum, own) in mass.iter_mut().zip(model.masses()) {
                 *sum += own;
             }
             terms.push(Box::new(ElasticTerm::new(model)) as Box<dyn EnergyTerm>);
+            let air = AirDrag::new(own.clone(), &AirSettings::default());
+            terms.push(Box::new(ElementTerm::new(air)));
             faces.extend(own);
             first += garment.vertices;
         }
@@ -66,7 +56,7 @@ impl OfflineCloth {
         seams: StitchSprings,
         gravity: V3d,
     ) -> Result<Self, OfflineError> {
-        let fabric = fabric_of(material);
+        let fabric = ElasticFabric::of_material(material);
         let model = ClothModel::new(rest, count, fabric)?;
         let (mass, sewn) = (model.masses().to_vec(), sewn_pairs(&seams.stitches));
         let terms: Vec<Box<dyn EnergyTerm>> = vec![

@@ -1,6 +1,7 @@
 //! Offline cloth on contact that never fails: steps, static drape, animation, checkpoints, obstacle springs.
 
-pub(crate) mod animation;
+pub(crate) mod air_drag;
+mod animation;
 pub(crate) mod checkpoint;
 mod checks;
 pub(crate) mod contacts;
@@ -29,6 +30,7 @@ pub use crate::settings::{
     ContactSettings, DrapeSettings, NewtonSettings, ObstacleSpring, OfflineSettings,
     OfflineStartSettings, SleepSettings, TimeScheme,
 };
+pub use air_drag::AirDrag;
 pub use animation::AnimationProgress;
 pub use checkpoint::{checkpoint_frame, checkpoint_state};
 pub use contacts::ContactReport;

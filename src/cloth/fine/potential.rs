@@ -16,6 +16,8 @@ pub(super) struct StepPotential<'a> {
     pub(super) start: &'a [V3d],
     /// Positions without forces (m).
     pub(super) inertial: &'a [V3d],
+    /// h (s).
+    pub(super) step: f64,
     /// 1/(γh)² (1/s²).
     pub(super) rate_squared: f64,
     pub(super) pins: &'a [PinTarget],
@@ -37,6 +39,7 @@ impl StepPotential<'_> {
             start: self.start,
             now: x,
             asleep: self.asleep,
+            step: self.step,
         }
     }
 

@@ -230,6 +230,7 @@ impl<'a> OfflineSolver<'a> {
                 cloth: self.cloth,
                 start: &state.now.x,
                 inertial: &inertial,
+                step: h,
                 rate_squared: coefficients.span.powi(-2),
                 pins: &targets.pins,
                 pin_stiffness: self.settings.pin_stiffness,

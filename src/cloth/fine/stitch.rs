@@ -1,6 +1,7 @@
 //! Stitches: springs of no length between a vertex and a point of an edge.
 
 use super::energy_term::EnergyElements;
+use crate::elastic::SheetMotion;
 use nalgebra::{Matrix3, SMatrix, SVector};
 use tryon_formats::sewn_obj::Stitch;
 use tryon_geometry::math::{ElementEnergy, V3d};
@@ -43,13 +44,13 @@ impl EnergyElements<3, 9> for StitchSprings {
         vertices(&self.stitches[element])
     }
 
-    fn value(&self, element: usize, x: &[V3d]) -> f64 {
-        0.5 * self.stiffness * gap(&self.stitches[element], x).norm_squared()
+    fn value(&self, element: usize, at: &SheetMotion<'_>) -> f64 {
+        0.5 * self.stiffness * gap(&self.stitches[element], at.now).norm_squared()
     }
 
-    fn expand(&self, element: usize, x: &[V3d]) -> ElementEnergy<9> {
+    fn expand(&self, element: usize, at: &SheetMotion<'_>) -> ElementEnergy<9> {
         let stitch = &self.stitches[element];
-        let (pull, w) = (gap(stitch, x) * self.stiffness, weights(stitch));
+        let (pull, w) = (gap(stitch, at.now) * self.stiffness, weights(stitch));
         let mut gradient = SVector::<f64, 9>::zeros();
         let mut hessian = SMatrix::<f64, 9, 9>::zeros();
         for i in 0..3 {
@@ -64,7 +65,7 @@ impl EnergyElements<3, 9> for StitchSprings {
             }
         }
         ElementEnergy {
-            value: self.value(element, x),
+            value: self.value(element, at),
             gradient,
             hessian,
         }
@@ -90,7 +91,7 @@ mod tests {
         };
         let evaluate = |x: &[f64], weight: f64| {
             let x: Vec<V3d> = x.chunks(3).map(V3d::from_column_slice).collect();
-            let e = springs.expand(0, &x);
+            let e = springs.expand(0, &SheetMotion::still(&x));
             let gradient = e.gradient * weight;
             Derivatives::energy(e.value * weight, gradient.as_slice().to_vec()).with_hessian(
                 DMatrix::from_column_slice(9, 9, (e.hessian * weight).as_slice()),
@@ -101,7 +102,10 @@ mod tests {
             evaluate,
         );
         let at = |y| [V3d::new(1.0, y, 0.0), V3d::zeros(), V3d::new(4.0, 0.0, 0.0)];
-        assert_eq!(springs.value(0, &at(0.5)), 0.5 * 40.0 * 0.25);
-        assert_eq!(springs.value(0, &at(0.0)), 0.0);
+        assert_eq!(
+            springs.value(0, &SheetMotion::still(&at(0.5))),
+            0.5 * 40.0 * 0.25
+        );
+        assert_eq!(springs.value(0, &SheetMotion::still(&at(0.0))), 0.0);
     }
 }

@@ -27,7 +27,7 @@ pub use crate::settings::Config;
 pub use collision::collision_model;
 pub use contact::self_contact;
 pub use error::ClothError;
-pub use model::{Element, Hinge, Sheet};
+pub use model::{BendingResolution, Element, Hinge, Sheet};
 pub use outfit::{AnchorBinding, Outfit};
 pub use outfit_model::Model;
 pub(crate) use outfit_model::WornBody;

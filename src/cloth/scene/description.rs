@@ -1,6 +1,7 @@
 //! A scene in memory.
 
 use super::Collider;
+use crate::fine::OfflineError;
 use crate::live::{ClothError, Config, Sheet};
 use crate::settings::SceneSettings;
 use tryon_formats::FormatError;
@@ -27,6 +28,9 @@ pub enum SceneError {
     /// The sheet or its simulation is at fault.
     #[error(transparent)]
     Cloth(#[from] ClothError),
+    /// The offline solver is at fault.
+    #[error(transparent)]
+    Offline(Box<OfflineError>),
     /// A step of the live solver that gave no result.
     #[error("frame {frame}: {why}")]
     Unsolved {

@@ -8,7 +8,7 @@ use serde::Deserialize;
 use std::path::Path;
 use tryon_formats::FormatError;
 use tryon_formats::obj::{parse_obj, read_obj};
-use tryon_garment::{IsotropicSolid, Material};
+use tryon_garment::{Bending, IsotropicSolid, Material};
 use tryon_geometry::math::V3d;
 use tryon_geometry::mesh::TriMesh;
 
@@ -158,7 +158,7 @@ impl MaterialFile {
             density: self.area_density / self.thickness,
         };
         Material {
-            bending: self.bending_rigidity,
+            bending: Bending::uniform(self.bending_rigidity),
             friction: self.friction,
             damping: 0.0,
             ..Material::isotropic(&self.name, solid, self.thickness, "scene file")

@@ -3,8 +3,7 @@
 use super::Scene;
 use super::file::flat;
 use super::solids::Solids;
-use crate::elastic::{ClothModel, RestSheet};
-use crate::fine::garment_cloth::fabric_of;
+use crate::elastic::{ClothModel, ElasticFabric, RestSheet};
 use crate::fine::{
     AnimationProgress, ElasticTerm, FrameTargets, MotionState, OfflineCloth, OfflineError,
     OfflineSettings, OfflineSolver, OfflineState, PinTarget,
@@ -38,7 +37,7 @@ impl<'a> OfflineScene<'a> {
             corners: corners.collect(),
             folded: Some(x.clone()),
         };
-        let fabric = fabric_of(&scene.material);
+        let fabric = ElasticFabric::of_material(&scene.material);
         let model = ClothModel::new(&rest, x.len(), fabric)?;
         let mass = model.masses().to_vec();
         let terms = vec![Box::new(ElasticTerm::new(model)) as Box<_>];

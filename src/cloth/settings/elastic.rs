@@ -18,6 +18,9 @@ settings! {
         pub measured: f64 = 0.02,
         /// Largest coupling over the geometric mean of two stiffnesses; from 1 on a sheet is unstable.
         pub largest_coupling: f64 = 0.9,
+        /// Curvature from which yarn friction is full (1/m): KES-FB2 reaches its line at about 0.05/cm. Smaller: flat cloth is
+        /// stiffer and Newton's systems harder.
+        pub friction_onset: f64 = 5.0,
         /// Least rigidity (N·m), far below any fabric's.
         pub least_bend: f64 = 1e-8,
         /// Least twist stiffness over the rigidity about 45°, half of an isotropic sheet's.

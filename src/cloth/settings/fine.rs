@@ -66,6 +66,14 @@ settings! {
         pub longest: f64 = 0.1,
     }
 
+    /// Still air around garments.
+    pub struct AirSettings {
+        /// Density at 20 °C (kg/m³).
+        pub density: f64 = 1.2,
+        /// Drag coefficient of a square plate across the flow (Hoerner 1965, "Fluid-dynamic drag").
+        pub drag: f64 = 1.18,
+    }
+
     /// Contact of cloth with itself and with the obstacle.
     pub struct ContactSettings {
         /// Distance beyond the thickness at which the barrier begins (m).

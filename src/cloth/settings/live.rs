@@ -8,6 +8,15 @@ use tryon_geometry::math::{Camera, Rigid, V3d, World};
 use tryon_geometry::par::Par;
 
 settings! {
+    /// Settings of the bending that a mesh carries.
+    pub struct ResolutionSettings {
+        /// Shortest bending length in edges. Smaller: folds sharper than the mesh, which crumple at every edge; larger:
+        /// fabrics that all bend alike.
+        pub edges: f64 = 0.5,
+        /// Gravity (m/s²).
+        pub gravity: f64 = 9.81,
+    }
+
     /// Settings of the simulation of one outfit.
     pub struct Config {
         /// Most substeps in 1/60 s. Triangles too stiff for these are softened; fewer strain cloth more, more cost time.

@@ -15,14 +15,15 @@ pub use contact::{
 };
 pub use elastic::ElasticSettings;
 pub use fine::{
-    ContactSettings, DrapeSettings, NewtonSettings, ObstacleSpring, OfflineSettings,
+    AirSettings, ContactSettings, DrapeSettings, NewtonSettings, ObstacleSpring, OfflineSettings,
     OfflineStartSettings, SleepSettings, TimeScheme,
 };
 pub use live::{
-    ClothContactSettings, Config, LiveStepSettings, NearPairSettings, SelfContactSettings,
+    ClothContactSettings, Config, LiveStepSettings, NearPairSettings, ResolutionSettings,
+    SelfContactSettings,
 };
 pub use repair::{ClothRepairSettings, SleeveSettings, UntanglerSettings};
-pub use scene::SceneSettings;
+pub use scene::{FabricTestSettings, SceneSettings};
 pub use solver::SolverSettings;
 pub use stillness::StillnessSettings;
 

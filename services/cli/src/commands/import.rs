@@ -9,6 +9,8 @@ use crate::input;
 use anyhow::{Context, Result, bail};
 use std::path::Path;
 use std::process::ExitCode;
+use tryon::cloth::BendingResolution;
+use tryon::cloth::settings::ResolutionSettings;
 use tryon::formats::fabric_json::parse_fabric;
 use tryon::formats::gltf::{GlbMesh, read_glb};
 use tryon::formats::mhclo::read_mhclo;
@@ -160,12 +162,15 @@ fn json(args: &ImportArgs) -> Result<()> {
     if text.contains("\"stretching\"") {
         let m = Material::from_measured(name, &parse_fabric(&text, path)?)?;
         println!(
-            "fabric `{name}`: {:.0} g/m², warp {:.0}, weft {:.0}, shear {:.0} N/m, bending {:.1e} N·m",
+            "fabric `{name}`: {:.0} g/m², warp {:.0}, weft {:.0}, shear {:.0} N/m, bending {:.1e} and {:.1e} N·m; \
+             --fabric {} takes it",
             m.area_density * 1e3,
             m.stretch_warp,
             m.stretch_weft,
             m.shear,
-            m.bending
+            m.bending.warp,
+            m.bending.weft,
+            path.display()
         );
         return Ok(());
     }
@@ -179,6 +184,16 @@ fn json(args: &ImportArgs) -> Result<()> {
         pattern.darts.len(),
         g.vertices,
         g.min_angle
+    );
+    let settings = ResolutionSettings::default();
+    let (limit, _) = BendingResolution::of(&g.material, &g.rest, &settings);
+    println!(
+        "{}: bending {:.1e} and {:.1e} N·m; in real time edges of {:.0} mm carry no less than {:.1e}",
+        g.material.name,
+        limit.own[0],
+        limit.own[1],
+        limit.edge * 1e3,
+        limit.least
     );
     match &args.out {
         Some(out) if out.extension().is_some_and(|e| e == "json") => {

@@ -133,11 +133,7 @@ pub(crate) fn run(args: &RunArgs) -> Result<ExitCode> {
         return super::run_offline::run(args);
     }
     ensure!(args.fine.still.is_none(), "--still needs --solver offline");
-    let choices = input::choices(
-        &args.garments,
-        args.size.as_deref(),
-        args.garment_body.as_deref(),
-    )?;
+    let choices = input::choices(&args.garments, &args.given())?;
     let source = open_recording(&args.input)?;
     let template = input::template(args.body.as_deref())?;
     input::create_dir(&args.out)?;

@@ -356,5 +356,8 @@ fn settle<'a>(
         flow()
     })?;
     bar.finish_and_clear();
+    if let Some(level) = done.1.levels.last().filter(|l| !l.drape.settled) {
+        eprintln!("tryon: the cloth is {}", level.drape);
+    }
     Ok(done)
 }

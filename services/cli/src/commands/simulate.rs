@@ -10,7 +10,8 @@ use serde::Serialize;
 use std::ops::ControlFlow;
 use std::process::ExitCode;
 use tryon::cloth::fine::{OfflineFrameReport, OfflineSettings, checkpoint_frame};
-use tryon::cloth::scene::{self, OfflineScene, Scene};
+use tryon::cloth::scene::{self, FabricSolver, FabricTest, FabricTrial, OfflineScene, Scene};
+use tryon::cloth::settings::FabricTestSettings;
 use tryon::formats::gltf::{GlbMesh, write_glb_motion};
 use tryon::geometry::math::P3;
 use tryon::geometry::par::Par;
@@ -26,6 +27,9 @@ const CLOTH: [u8; 3] = [190, 190, 200];
 /// A scene at fault, named by field, or results that cannot be written.
 pub(crate) fn run(args: &SimulateArgs) -> Result<ExitCode> {
     let is_offline = args.solver.is_offline()?;
+    if let Some(test) = args.scene.to_str().and_then(FabricTest::named) {
+        return fabric_test(args, test, is_offline);
+    }
     let scene = scene::load(&args.scene)?;
     input::create_dir(&args.out)?;
     if is_offline {
@@ -33,6 +37,24 @@ pub(crate) fn run(args: &SimulateArgs) -> Result<ExitCode> {
     } else {
         realtime(args, &scene)
     }
+}
+
+/// Runs a textile test.
+fn fabric_test(args: &SimulateArgs, test: FabricTest, is_offline: bool) -> Result<ExitCode> {
+    let trial = FabricTrial {
+        test,
+        fabric: input::fabric(&args.fabric)?,
+        solver: match is_offline {
+            true => FabricSolver::Offline,
+            false => FabricSolver::Realtime,
+        },
+        edge: args.edge,
+    };
+    input::create_dir(&args.out)?;
+    let report = trial.run(&FabricTestSettings::default())?;
+    write(&args.out.join("report.json"), &report)?;
+    println!("{report}");
+    Ok(ExitCode::SUCCESS)
 }
 
 /// Simulates by the real-time solver.

@@ -1,10 +1,10 @@
 //! Whole sheets against closed forms and measured curves of tension.
 
 use super::statics::Statics;
-use super::strips::{StripPattern, TestStrip, strip};
 use super::{
     BendLaw, ClothModel, ElasticExpansion, ElasticFabric, RestSheet, StretchLaw, Stretching,
 };
+use crate::specimens::strip::{StripMesh, StripPattern, strip};
 use nalgebra::Matrix2;
 use tryon_formats::fabric_json::read_fabric;
 use tryon_formats::shared_data;
@@ -26,13 +26,13 @@ fn fabric(stretch: StretchLaw, rigidity: f64) -> ElasticFabric {
     }
 }
 
-fn model(s: &TestStrip, fabric: ElasticFabric) -> ClothModel {
+fn model(s: &StripMesh, fabric: ElasticFabric) -> ClothModel {
     let rest = RestSheet::flat(s.faces.clone(), &s.at).expect("faces");
     ClothModel::new(&rest, s.at.len(), fabric).expect("valid")
 }
 
 /// Positions of a strip under a homogeneous deformation of its plane.
-fn deformed(s: &TestStrip, f: &Matrix2<f64>) -> Vec<V3d> {
+fn deformed(s: &StripMesh, f: &Matrix2<f64>) -> Vec<V3d> {
     let at = s.at.iter().map(|p| f * p);
     at.map(|p| V3d::new(p.x, 0.0, p.y)).collect()
 }

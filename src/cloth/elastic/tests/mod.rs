@@ -6,4 +6,3 @@ mod cantilever;
 mod curves;
 mod picture_frame;
 mod statics;
-pub(super) mod strips;

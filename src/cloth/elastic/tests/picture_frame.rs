@@ -7,10 +7,10 @@
 
 use super::curves::WOVEN;
 use super::statics::Statics;
-use super::strips::{StripPattern, TestStrip, strip};
 use super::{BendLaw, ClothModel, ElasticExpansion, ElasticFabric, RestSheet};
 use super::{MeasuredStretch, StretchLaw};
 use crate::settings::ElasticSettings;
+use crate::specimens::strip::{StripMesh, StripPattern, strip};
 use nalgebra::Vector2;
 use tryon_formats::fabric_json::read_fabric;
 use tryon_formats::shared_data;
@@ -23,7 +23,7 @@ const SIDE: f64 = 0.1;
 const ANGLES: [f64; 3] = [0.1, 0.4, 0.8];
 
 /// Mesh of n × n squares.
-fn square(n: usize, pattern: StripPattern) -> TestStrip {
+fn square(n: usize, pattern: StripPattern) -> StripMesh {
     strip(SIDE * (n as f64 - 1.5) / n as f64, n, n, pattern)
 }
 
@@ -36,7 +36,7 @@ struct Patch {
 }
 
 impl Patch {
-    fn new(mesh: &TestStrip, stretch: &StretchLaw) -> Self {
+    fn new(mesh: &StripMesh, stretch: &StretchLaw) -> Self {
         let (mut at, faces) = (mesh.at.clone(), mesh.faces.clone());
         let first = at[0];
         at.iter_mut().for_each(|p| *p -= first);

@@ -5,52 +5,28 @@ use super::sheets::{
 };
 use super::*;
 use crate::elastic::ElasticFabric;
-use nalgebra::{Matrix4, Vector2, Vector4};
-use std::f64::consts::TAU;
+use crate::specimens::drape_disc::{DrapeDisc, SPECIMEN, SUPPORT};
+use nalgebra::{Matrix4, Vector4};
 use std::ops::ControlFlow;
 use tryon_formats::fabric_json::read_fabric;
 use tryon_formats::shared_data;
 use tryon_geometry::math::V3d;
 use tryon_geometry::par::Par;
 
-/// Radii of support and specimen (m).
-const SUPPORT: f64 = 0.09;
-const SPECIMEN: f64 = 0.15;
-/// Rings held between the plates: they clamp the cloth half-way between the second and the third.
-const HELD: usize = 3;
-
-/// Ring of cloth around the support.
-struct Specimen {
+/// Disc on its support.
+struct DrapeSpecimen {
+    disc: DrapeDisc,
     sheet: PlanarSheet,
-    held: usize,
 }
 
-impl Specimen {
-    /// Rings of vertices a distance h apart, (1.5 + `free`) h covering the free width.
+impl DrapeSpecimen {
     fn new(free: usize) -> Self {
-        let h = (SPECIMEN - SUPPORT) / (free as f64 + 0.5);
-        let radius = |k: usize| SUPPORT + (k as f64 - 1.5) * h;
-        let count = |k: usize| (TAU * radius(k) / h).round() as u32;
-        let mut sheet = PlanarSheet::default();
-        let (mut held, mut inner) = (0, 0);
-        for k in 0..HELD + free {
-            let first = sheet.at.len() as u32;
-            let n = count(k);
-            // Half a turn of offset every other ring.
-            let phase = 0.5 * (k % 2) as f64;
-            sheet.at.extend((0..n).map(|i| {
-                let (s, c) = (TAU * (f64::from(i) + phase) / f64::from(n)).sin_cos();
-                Vector2::new(c, s) * radius(k)
-            }));
-            if k > 0 {
-                join_rings(&mut sheet, [inner, first]);
-            }
-            if k < HELD {
-                held = sheet.at.len();
-            }
-            inner = first;
-        }
-        Self { sheet, held }
+        let disc = DrapeDisc::new(free);
+        let sheet = PlanarSheet {
+            at: disc.at.clone(),
+            faces: disc.faces.clone(),
+        };
+        Self { disc, sheet }
     }
 
     fn pins(&self) -> Vec<PinTarget> {
@@ -59,13 +35,13 @@ impl Specimen {
             vertex: v as u32,
             target: flat[v],
         };
-        (0..self.held).map(pin).collect()
+        (0..self.disc.held).map(pin).collect()
     }
 
     /// Rest on the support from the plane with bumps of `bump` (m).
     fn drape(&self, fabric: ElasticFabric, bump: f64, newton: NewtonSettings) -> Vec<V3d> {
         let mut x = self.sheet.at_height(0.0);
-        for (i, p) in x.iter_mut().enumerate().skip(self.held) {
+        for (i, p) in x.iter_mut().enumerate().skip(self.disc.held) {
             // Golden ratio sequence: bumps without a period.
             p.y = bump * ((i as f64 * 0.618_033_988_75).fract() - 0.5);
         }
@@ -91,57 +67,6 @@ impl Specimen {
         let x = solver.state().now.x.clone();
         assert_eq!(exhaustive_crossings([&x, &[]], [&self.sheet.faces, &[]]), 0);
         x
-    }
-
-    /// Share of the ring that the shadow of `x` covers, by points 1 mm apart.
-    fn drape_coefficient(&self, x: &[V3d]) -> f64 {
-        const SIDE: i32 = 320;
-        let at = |k: i32| f64::from(k - SIDE / 2) * 1e-3;
-        let mut is_covered = vec![false; (SIDE * SIDE) as usize];
-        for f in &self.sheet.faces {
-            let [a, b, c] = f.map(|v| Vector2::new(x[v as usize].x, x[v as usize].z));
-            let cell = |p: f64| (p * 1e3) as i32 + SIDE / 2;
-            let (low, high) = (a.inf(&b).inf(&c), a.sup(&b).sup(&c));
-            for i in cell(low.x) - 1..=cell(high.x) + 1 {
-                for j in cell(low.y) - 1..=cell(high.y) + 1 {
-                    let p = Vector2::new(at(i), at(j));
-                    let turns = [(a, b), (b, c), (c, a)].map(|(q, r)| (r - q).perp(&(p - q)));
-                    if turns.iter().all(|t| *t >= 0.0) || turns.iter().all(|t| *t <= 0.0) {
-                        is_covered[(i * SIDE + j) as usize] = true;
-                    }
-                }
-            }
-        }
-        let covered = (0..SIDE * SIDE).filter(|k| {
-            let p = Vector2::new(at(k / SIDE), at(k % SIDE));
-            is_covered[*k as usize] && p.norm() > SUPPORT
-        });
-        let ring = 0.5 * TAU * (SPECIMEN.powi(2) - SUPPORT.powi(2));
-        covered.count() as f64 * 1e-6 / ring
-    }
-}
-
-/// Triangles between the last ring of `sheet`, from vertex `outer`, and the one before it, from `inner`.
-fn join_rings(sheet: &mut PlanarSheet, [inner, outer]: [u32; 2]) {
-    let end = sheet.at.len() as u32;
-    let [n, m] = [outer - inner, end - outer];
-    let angle = |v: u32, turns: u32| {
-        let p = sheet.at[v as usize];
-        p.y.atan2(p.x).rem_euclid(TAU) + TAU * f64::from(turns)
-    };
-    let (mut i, mut j) = (0, 0);
-    while i < n || j < m {
-        let [a, b] = [inner + i % n, outer + j % m];
-        let [next_a, next_b] = [inner + (i + 1) % n, outer + (j + 1) % m];
-        let is_inner =
-            i < n && (j == m || angle(next_a, (i + 1) / n) <= angle(next_b, (j + 1) / m));
-        if is_inner {
-            sheet.faces.push([a, b, next_a]);
-            i += 1;
-        } else {
-            sheet.faces.push([a, b, next_b]);
-            j += 1;
-        }
     }
 }
 
@@ -185,7 +110,7 @@ fn a_stiff_disc_sags_as_a_clamped_plate() {
     let (poisson, rigidity) = (0.3, 0.01);
     let expected = plate_rim(0.2 * GRAVITY, rigidity, poisson);
     let error = |free| {
-        let specimen = Specimen::new(free);
+        let specimen = DrapeSpecimen::new(free);
         let x = specimen.drape(isotropic(100.0, poisson, rigidity), 0.0, converged());
         let rim = x.iter().filter(|p| p.x.hypot(p.z) > 0.999 * SPECIMEN);
         let (sum, count) = rim.fold((0.0, 0.0), |s, p| (s.0 - p.y, s.1 + 1.0));
@@ -223,9 +148,9 @@ fn check_kind(name: &str) {
         ..NewtonSettings::default()
     };
     let coefficients = [4, 6].map(|free| {
-        let specimen = Specimen::new(free);
+        let specimen = DrapeSpecimen::new(free);
         let x = specimen.drape(ElasticFabric::measured(&data), 1e-3, newton);
-        specimen.drape_coefficient(&x)
+        specimen.disc.drape_coefficient(&x)
     });
     let [coarse, fine] = coefficients;
     assert!((coarse - fine).abs() < 0.04, "{name}: {coefficients:?}");

@@ -27,7 +27,7 @@ const ALIGNED: f64 = 0.9;
 impl Membrane {
     /// Stiffness of a fabric: `along` is what μ and λ lack of the measured warp and weft stiffness.
     pub fn new(m: &tryon_garment::Material) -> Self {
-        let nu = m.coupling / (m.coupling + 2.0 * m.shear); // 2D: λ = 2μν/(1−ν)
+        let nu = m.poisson();
         let plane = |k: f64| (k / (1.0 - nu * nu) - 2.0 * m.shear - m.coupling).max(0.0);
         Self {
             mu: m.shear,

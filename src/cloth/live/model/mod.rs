@@ -4,8 +4,10 @@ pub(super) mod bands;
 pub(crate) mod bending;
 pub(crate) mod membrane;
 pub(crate) mod partition;
+mod resolution;
 pub(crate) mod sheet;
 
 pub use bending::Hinge;
 pub use membrane::Membrane;
+pub use resolution::BendingResolution;
 pub use sheet::{Element, Sheet};

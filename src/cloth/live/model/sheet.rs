@@ -1,10 +1,12 @@
 //! A sheet of cloth as a mechanical system: masses, flat triangles, hinges.
 
-use super::bending::{Hinge, Wing};
+use super::bending::{Hinge, HingeSide, Wing};
 use super::membrane::Membrane;
+use super::resolution::BendingResolution;
 use crate::live::ClothError;
+use crate::settings::{AirSettings, ResolutionSettings};
 use nalgebra::Matrix3x2;
-use tryon_garment::Material;
+use tryon_garment::{Bending, Material};
 use tryon_geometry::math::order_statistics::percentile;
 use tryon_geometry::math::{P3, V3d};
 use tryon_geometry::mesh::{Face, Topology, TriMesh};
@@ -63,8 +65,10 @@ pub struct Sheet {
     pub membrane: Membrane,
     /// Edges with their rest lengths (m).
     pub edges: Vec<([u32; 2], f64)>,
-    /// Rate of air drag (1/s).
+    /// Damping rate (1/s).
     pub damping: f64,
+    /// Drag of the air, ½ ρ C (kg/m³); zero in a vacuum.
+    pub air: f64,
     /// Coulomb coefficient.
     pub friction: f64,
 }
@@ -105,7 +109,7 @@ impl Sheet {
                 (e.v, twin.map_or(l, |t| 0.5 * (l + t)))
             })
             .collect();
-        let hinges = hinges(&topology, &flat, &elements, material.bending, curved_rest);
+        let hinges = hinges(&topology, &flat, &material.bending, curved_rest);
         Ok(Self {
             mass,
             elements,
@@ -113,15 +117,21 @@ impl Sheet {
             membrane: Membrane::new(material),
             edges,
             damping: material.damping,
+            air: 0.0,
             friction: material.friction,
         })
     }
-    /// Sheet of a garment.
+    /// Sheet of a garment in still air, with the bending that its edges carry ([`BendingResolution`]).
     ///
     /// # Errors
     /// As [`Sheet::new`].
     pub fn of_garment(g: &tryon_garment::GarmentMesh) -> Result<Self, ClothError> {
-        Self::new(g.vertices, &g.faces, &g.rest, &g.material, None)
+        let settings = ResolutionSettings::default();
+        let (_, carried) = BendingResolution::of(&g.material, &g.rest, &settings);
+        let mut sheet = Self::new(g.vertices, &g.faces, &g.rest, &carried, None)?;
+        let air = AirSettings::default();
+        sheet.air = 0.5 * air.density * air.drag;
+        Ok(sheet)
     }
     /// Elastic energy (J).
     pub fn energy(&self, x: &[V3d]) -> f64 {
@@ -194,6 +204,16 @@ impl FlatTriangles<'_> {
         let (p, q) = (at(a), at(b));
         (p[0] - q[0]).hypot(p[1] - q[1])
     }
+    /// Direction of the edge a b in a face, and the face's area.
+    fn side(&self, face: u32, [a, b]: [u32; 2]) -> HingeSide {
+        let (f, t) = (&self.faces[face as usize], &self.rest[face as usize]);
+        let at = |v: u32| f.iter().position(|q| *q == v).map_or([0.0; 2], |k| t[k]);
+        let (p, q) = (at(a), at(b));
+        HingeSide {
+            edge: [q[0] - p[0], q[1] - p[1]],
+            area: Element::new(*f, t).area,
+        }
+    }
     /// A face on the edge a b.
     fn wing(&self, face: u32, [a, b]: [u32; 2], apex: u32) -> Wing {
         Wing {
@@ -206,8 +226,7 @@ impl FlatTriangles<'_> {
 fn hinges(
     topology: &Topology,
     flat: &FlatTriangles<'_>,
-    elements: &[Element],
-    bending: f64,
+    bending: &Bending,
     curved_rest: Option<&[P3]>,
 ) -> Vec<Hinge> {
     let mut hinges = Vec::new();
@@ -216,11 +235,13 @@ fn hinges(
             continue;
         };
         let wings = [flat.wing(e.face, e.v, c), flat.wing(twin, e.v, d)];
-        let area = elements[e.face as usize].area + elements[twin as usize].area;
+        let sides = [e.face, twin].map(|face| flat.side(face, e.v));
+        let area = sides[0].area + sides[1].area;
+        let rigidity = 0.5 * (sides[0].rigidity(bending) + sides[1].rigidity(bending));
         let mut hinge = Hinge {
             v: [e.v[0], e.v[1], c, d],
             c: Hinge::coefficients(&wings),
-            w: 3.0 * bending / area,
+            w: rigidity / area,
             rest: 0.0,
         };
         if let Some(p) = curved_rest {

@@ -16,6 +16,8 @@ const FRAMES: &str = "simulating {bar:32} {pos}/{len} frames {msg}";
 pub(super) struct FineProgress {
     bar: ProgressBar,
     template: &'static str,
+    /// Motion of a vertex in the last step of the drape (m), while it is not at rest.
+    moving: Option<f32>,
 }
 
 impl FineProgress {
@@ -23,7 +25,11 @@ impl FineProgress {
     pub(super) fn new() -> Self {
         let bar = ProgressBar::new_spinner();
         bar.enable_steady_tick(Duration::from_secs(1));
-        let mut progress = Self { bar, template: "" };
+        let mut progress = Self {
+            bar,
+            template: "",
+            moving: None,
+        };
         progress.switch(DRAPE);
         progress
     }
@@ -36,8 +42,15 @@ impl FineProgress {
                 let text = format!("{} vertices, moved {moved:.1} mm", step.vertex_count);
                 self.bar.set_message(text);
                 self.bar.inc(1);
+                self.moving = (!step.settled).then_some(step.motion);
             }
             return;
+        }
+        if let Some(motion) = self.moving.take() {
+            let moved = motion * 1e3;
+            let text =
+                format!("tryon: the cloth is not at rest: a vertex moves {moved:.1} mm in a step");
+            self.bar.suspend(|| eprintln!("{text}"));
         }
         if message.frame_count > 0 {
             self.bar.set_length(u64::from(message.frame_count));

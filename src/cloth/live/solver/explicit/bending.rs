@@ -1,6 +1,7 @@
-//! Bending forces, kept for several substeps because they change slowly.
+//! Bending forces and drag of the air, kept for several substeps because they change slowly.
 
 use super::active_set::{active_ranges, clip};
+use super::air::Airflow;
 use super::blocks::{HingeBlock, lowest};
 use super::dispatch::wide;
 use super::patch_model::PatchModel;
@@ -12,7 +13,7 @@ use super::vec4::{MAX_VERTICES, SLOT_MASK, V4};
 const SMALLEST: f32 = 1e-24;
 
 impl PatchState {
-    /// Evaluates bending forces within `rings` rings of the owned vertices; they are kept until the next evaluation.
+    /// Evaluates bending and drag within `rings` rings of the owned vertices; they are kept until the next evaluation.
     /// Positions are extrapolated by `lookahead` (s), half of the time that forces will be kept.
     pub fn update_bending(&mut self, f: &PatchModel, lookahead: f32, rings: usize) {
         wide!(bending_kernel(self, f: &PatchModel, lookahead: f32, rings: usize));
@@ -65,6 +66,11 @@ fn bending_kernel<L: Simd8>(
             add_curved(l, b, x, out);
         }
     }
+    let flow = Airflow {
+        x,
+        v: &state.velocity,
+    };
+    flow.add(f, active, end, out);
     for r in involved {
         let r = clip(r, n);
         bending[r.clone()].copy_from_slice(&out[r]);

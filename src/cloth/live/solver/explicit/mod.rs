@@ -6,6 +6,7 @@
 //! allows longer steps. Elements that are still too stiff are softened when the garment is made, and counted.
 
 mod active_set;
+mod air;
 mod bending;
 mod blocks;
 mod constraint;

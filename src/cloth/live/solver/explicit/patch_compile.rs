@@ -106,6 +106,7 @@ impl StableSheet {
             islands: islands.clone(),
             vertices: set.clone(),
             damping: self.damping,
+            air: self.air,
         }
     }
 }

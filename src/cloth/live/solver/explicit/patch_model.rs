@@ -55,6 +55,8 @@ pub struct PatchModel {
     pub(super) bend: Vec<(Slot, f32)>,
     pub(super) bent: Vec<HingeBlock>,
     pub(super) damping: f32,
+    /// Drag of the air, ½ ρ C (kg/m³).
+    pub(super) air: f32,
 }
 
 impl PatchModel {

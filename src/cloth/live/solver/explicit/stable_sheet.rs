@@ -42,6 +42,7 @@ pub struct StableSheet {
     /// Coefficients of the mass filter, the lowest (1) first.
     pub(super) filter: Vec<f32>,
     pub(super) damping: f32,
+    pub(super) air: f32,
 }
 
 impl StableSheet {
@@ -77,6 +78,7 @@ impl StableSheet {
             filter_weight: filter.weight.iter().map(|w| *w as f32).collect(),
             filter: filter.coefficients.iter().map(|c| *c as f32).collect(),
             damping: sheet.damping as f32,
+            air: sheet.air as f32,
         }
     }
     /// Number of vertices.

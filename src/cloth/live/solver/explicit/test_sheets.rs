@@ -7,7 +7,7 @@ use super::{
 };
 use crate::live::Sheet;
 use crate::settings::SolverSettings;
-use tryon_garment::{IsotropicSolid, Material};
+use tryon_garment::{Bending, IsotropicSolid, Material};
 use tryon_geometry::math::V3d;
 use tryon_geometry::mesh::Face;
 
@@ -30,7 +30,7 @@ pub(super) fn cotton(bending: f64) -> Material {
         density: 0.18 / 3e-4,
     };
     let mut m = Material::isotropic("test", solid, 3e-4, "test");
-    (m.bending, m.damping) = (bending, 0.0);
+    (m.bending, m.damping) = (Bending::uniform(bending), 0.0);
     m
 }
 

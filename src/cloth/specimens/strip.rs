@@ -1,15 +1,17 @@
-//! Meshes of rectangular strips for tests: structured and unstructured.
+//! Meshes of rectangular strips: structured and unstructured.
 
 use nalgebra::Vector2;
 
 /// Triangulation of a strip.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(in crate::elastic) enum StripPattern {
+pub(crate) enum StripPattern {
     /// Squares cut along one diagonal.
+    #[cfg(test)]
     Uniform,
     /// Squares cut along alternating diagonals.
     Alternating,
     /// Rows shifted by half a square: nearly equilateral triangles.
+    #[cfg(test)]
     Staggered,
     /// Delaunay triangles of a grid jittered by 0.3 squares, by this seed.
     Unstructured(u32),
@@ -17,23 +19,20 @@ pub(in crate::elastic) enum StripPattern {
 
 /// Flat mesh of a strip, u along its length.
 #[derive(Clone, Debug)]
-pub(in crate::elastic) struct TestStrip {
-    pub(in crate::elastic) at: Vec<Vector2<f64>>,
-    pub(in crate::elastic) faces: Vec<[u32; 3]>,
+pub(crate) struct StripMesh {
+    /// Vertices (m).
+    pub(crate) at: Vec<Vector2<f64>>,
+    /// Triangles.
+    pub(crate) faces: Vec<[u32; 3]>,
     /// Vertices of one column.
-    pub(in crate::elastic) rows: usize,
+    pub(crate) rows: usize,
 }
 
 /// Strip from u = −3h/2 to `length`, with `columns` squares of size h along it and `rows` across, v from 0.
 ///
 /// The first three columns of vertices are straight: held, they clamp the strip at u = 0 to second order in h, and no
 /// element at its end sees it bend.
-pub(in crate::elastic) fn strip(
-    length: f64,
-    columns: usize,
-    rows: usize,
-    pattern: StripPattern,
-) -> TestStrip {
+pub(crate) fn strip(length: f64, columns: usize, rows: usize, pattern: StripPattern) -> StripMesh {
     let h = length / (columns as f64 - 1.5);
     let across = rows + 1;
     let mut random = Random(match pattern {
@@ -57,6 +56,7 @@ pub(in crate::elastic) fn strip(
                         };
                     }
                 }
+                #[cfg(test)]
                 StripPattern::Staggered if inside[0] && j % 2 == 1 => p.x += 0.5,
                 _ => {}
             }
@@ -70,6 +70,7 @@ pub(in crate::elastic) fn strip(
             let [a, b, c, d] = [k, k + across as u32, k + across as u32 + 1, k + 1];
             let other = match pattern {
                 StripPattern::Alternating => (i + j) % 2 == 1,
+                #[cfg(test)]
                 StripPattern::Staggered => j % 2 == 1,
                 _ => false,
             };
@@ -83,7 +84,7 @@ pub(in crate::elastic) fn strip(
     if matches!(pattern, StripPattern::Unstructured(_)) {
         flip_to_delaunay(&at, &mut faces);
     }
-    TestStrip {
+    StripMesh {
         at,
         faces,
         rows: across,
