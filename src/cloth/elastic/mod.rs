@@ -12,7 +12,7 @@ mod fabric;
 mod fan_expansion;
 mod fans;
 mod jet;
-mod loading_bend;
+pub(crate) mod loading_bend;
 pub(crate) mod measured_bend;
 pub(crate) mod measured_stretch;
 pub(crate) mod membrane;
@@ -21,7 +21,7 @@ mod packed;
 pub(crate) mod rest_sheet;
 pub(crate) mod stretch_law;
 mod stretching;
-mod tension_law;
+pub(crate) mod tension_law;
 #[cfg(test)]
 mod tests;
 

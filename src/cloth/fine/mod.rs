@@ -1,7 +1,7 @@
 //! Offline cloth on contact that never fails: steps, static drape, animation, checkpoints, obstacle springs.
 
 pub(crate) mod air_drag;
-mod animation;
+pub(crate) mod animation;
 pub(crate) mod checkpoint;
 mod checks;
 pub(crate) mod contacts;

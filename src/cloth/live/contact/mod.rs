@@ -3,9 +3,9 @@
 pub(super) mod anchor;
 pub(crate) mod body_contact;
 pub(super) mod chunk;
-mod near_candidates;
-mod near_pairs;
+pub(crate) mod near_candidates;
+pub(crate) mod near_pairs;
 mod outfit_vertices;
-pub(super) mod pair_contact;
+pub(crate) mod pair_contact;
 pub mod self_contact;
 pub(super) mod skin_projection;
