@@ -6,7 +6,7 @@
 use super::energy_term::EnergyElements;
 use crate::elastic::SheetMotion;
 use crate::settings::AirSettings;
-use nalgebra::{Matrix3, SMatrix, SVector};
+use nalgebra::Matrix3;
 use tryon_geometry::math::{ElementEnergy, V3d};
 use tryon_geometry::mesh::Face;
 
@@ -73,21 +73,7 @@ impl EnergyElements<3, 9> for AirDrag {
         let size = d.along.abs();
         let pull = d.normal * (d.scale * d.along * size / 3.0);
         let block: Matrix3<f64> = d.normal * d.normal.transpose() * (d.scale * 2.0 * size / 9.0);
-        let mut gradient = SVector::<f64, 9>::zeros();
-        let mut hessian = SMatrix::<f64, 9, 9>::zeros();
-        for i in 0..3 {
-            gradient.fixed_rows_mut::<3>(3 * i).copy_from(&pull);
-            for j in 0..3 {
-                hessian
-                    .fixed_view_mut::<3, 3>(3 * i, 3 * j)
-                    .copy_from(&block);
-            }
-        }
-        ElementEnergy {
-            value: self.value(element, at),
-            gradient,
-            hessian,
-        }
+        ElementEnergy::of_corners(self.value(element, at), |_| pull, |_, _| block)
     }
 }
 

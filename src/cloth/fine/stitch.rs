@@ -2,7 +2,7 @@
 
 use super::energy_term::EnergyElements;
 use crate::elastic::SheetMotion;
-use nalgebra::{Matrix3, SMatrix, SVector};
+use nalgebra::Matrix3;
 use tryon_formats::sewn_obj::Stitch;
 use tryon_geometry::math::{ElementEnergy, V3d};
 
@@ -51,24 +51,11 @@ impl EnergyElements<3, 9> for StitchSprings {
     fn expand(&self, element: usize, at: &SheetMotion<'_>) -> ElementEnergy<9> {
         let stitch = &self.stitches[element];
         let (pull, w) = (gap(stitch, at.now) * self.stiffness, weights(stitch));
-        let mut gradient = SVector::<f64, 9>::zeros();
-        let mut hessian = SMatrix::<f64, 9, 9>::zeros();
-        for i in 0..3 {
-            gradient
-                .fixed_rows_mut::<3>(3 * i)
-                .copy_from(&(pull * w[i]));
-            for j in 0..3 {
-                let block = Matrix3::from_diagonal_element(self.stiffness * w[i] * w[j]);
-                hessian
-                    .fixed_view_mut::<3, 3>(3 * i, 3 * j)
-                    .copy_from(&block);
-            }
-        }
-        ElementEnergy {
-            value: self.value(element, at),
-            gradient,
-            hessian,
-        }
+        ElementEnergy::of_corners(
+            self.value(element, at),
+            |i| pull * w[i],
+            |i, j| Matrix3::from_diagonal_element(self.stiffness * w[i] * w[j]),
+        )
     }
 }
 

@@ -9,9 +9,6 @@ use super::solver::explicit::{Exemptions, Recovery, Substep, V4, run_substeps};
 use std::ops::Range;
 use tryon_geometry::par;
 
-/// Evaluations of bending between two selections of the contact planes within reach.
-const PLANE_INTERVAL: usize = 1;
-
 /// One interval of a step.
 #[derive(Clone, Copy)]
 pub(super) struct Interval {
@@ -105,10 +102,8 @@ impl GarmentSolver<'_> {
     fn substep(&self, s: usize, k: usize, p: &mut PatchWork) {
         let (f, h, every) = (&self.m.patches[k], self.h, self.m.bending_interval);
         let t = (self.range.start + s) as f32 * h;
-        if s.is_multiple_of(PLANE_INTERVAL * every) {
-            self.select_planes(s, k, p);
-        }
         if s.is_multiple_of(every) {
+            self.select_planes(s, k, p);
             let lookahead = h * every.min(self.range.len() - s) as f32 * 0.5;
             p.motion.update_bending(f, lookahead, self.m.filter_degree);
         }
@@ -141,7 +136,7 @@ impl GarmentSolver<'_> {
 
     /// Selects the planes that vertices can reach until the next selection.
     fn select_planes(&self, s: usize, k: usize, p: &mut PatchWork) {
-        let steps = (PLANE_INTERVAL * self.m.bending_interval).min(self.range.len() - s);
+        let steps = self.m.bending_interval.min(self.range.len() - s);
         let t = (self.range.start + s) as f32 * self.h;
         let span = steps as f32 * self.h;
         let gain = self.model.config.solver.speed_gain;

@@ -37,7 +37,7 @@ settings! {
         pub taut: f32 = 1.15,
         /// Stretch ratio above which contact constraints are released: more than knitwear is worn at.
         pub overstretched: f32 = 1.5,
-        /// Speed that a vertex may gain towards a surface between two searches for reachable planes (m/s): over 1.7 ms 120
+        /// Speed that a vertex may gain towards a surface between two searches for reachable planes (m/s): over 0.85 ms 120
         /// times gravity. Smaller misses contacts; larger keeps planes out of reach.
         pub speed_gain: f32 = 1.0,
         /// Share of a penetration that one substep removes. Larger jitters; smaller leaves cloth inside for longer.

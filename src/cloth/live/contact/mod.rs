@@ -7,5 +7,6 @@ pub(crate) mod near_candidates;
 pub(crate) mod near_pairs;
 mod outfit_vertices;
 pub(crate) mod pair_contact;
+mod pair_reach;
 pub mod self_contact;
 pub(super) mod skin_projection;

@@ -3,6 +3,7 @@
 //! Most cloth is near no other sheet: where a garment is not folded, its vertices have none of the faces within two rings.
 
 use super::outfit_vertices::{OutfitVertices, surface};
+use super::pair_reach::{PairReach, longest_edge};
 use crate::contact::{LANES, TriangleFan};
 use crate::live::outfit_model::Model;
 use crate::live::state::State;
@@ -53,12 +54,10 @@ impl NearCandidates {
     /// Finds what may touch within `span` seconds.
     pub(super) fn find(&mut self, model: &Model, state: &State, all: &OutfitVertices, span: f32) {
         let settings = &model.config.contact.pairs;
-        let edges = model.garments.iter().map(|g| g.self_contact.edge());
-        let edge = edges.fold(0.0, f32::max);
-        let reach = settings.reach_edges * edge;
-        let farthest = settings.farthest_candidate.max(reach);
-        let circumradius_squared = edge * edge / 3.0;
-        let corner = (farthest * farthest + circumradius_squared).sqrt();
+        let limits = [settings.farthest_candidate, settings.slack];
+        let reach = PairReach::new(model, limits, span);
+        let circumradius_squared = longest_edge(model).powi(2) / 3.0;
+        let corner = (reach.farthest * reach.farthest + circumradius_squared).sqrt();
         self.grid.fill(&all.x, 2.0 * corner);
         self.measure_flatness(model, all);
 
@@ -75,10 +74,8 @@ impl NearCandidates {
             flatness: &self.flatness,
             settings,
             reach,
-            farthest,
             corner,
             circumradius_squared,
-            span,
         };
         let par = model.config.par;
         par::for_chunks(par, &mut found, 1, |k, f| {
@@ -136,23 +133,14 @@ struct CandidateSearch<'a> {
     grid: &'a HashGrid,
     flatness: &'a [f32],
     settings: &'a NearPairSettings,
-    /// Reach at rest and at most, and that of the query for corners, metres.
-    reach: f32,
-    farthest: f32,
+    reach: PairReach,
+    /// Reach of the query for corners, metres.
     corner: f32,
     /// Squared circumradius of a face, m².
     circumradius_squared: f32,
-    /// Time until the next query, s.
-    span: f32,
 }
 
 impl CandidateSearch<'_> {
-    /// Reach of what closes at this speed, metres.
-    fn reach_at(&self, closing: f32) -> f32 {
-        let motion = closing.max(0.0) * self.span + self.settings.slack;
-        (self.reach + motion).min(self.farthest)
-    }
-
     fn find_faces(&self, range: Range<usize>, out: &mut ChunkFindings) {
         out.faces.clear();
         for (met, n) in [
@@ -249,20 +237,20 @@ impl CandidateSearch<'_> {
     fn is_corner_near(&self, v: u32, w: u32, square: f32) -> bool {
         let velocity = &self.all.velocity;
         let closing = (velocity[w as usize] - velocity[v as usize]).norm();
-        let reach = self.reach_at(closing);
+        let reach = self.reach.at(closing);
         square <= reach * reach + self.circumradius_squared
     }
 
     /// The closest point of a face, by the weights of its second and third corner, may come within reach of a vertex from
     /// this squared distance, m².
     fn is_near(&self, v: u32, corners: [u32; 3], [p, q]: [f32; 2], square: f32) -> bool {
-        if square >= self.farthest * self.farthest {
+        if square >= self.reach.farthest * self.reach.farthest {
             return false;
         }
         let velocity = |v: u32| self.all.velocity[v as usize];
         let of_face = corners.map(velocity);
         let speed = of_face[0] * (1.0 - p - q) + of_face[1] * p + of_face[2] * q - velocity(v);
-        let reach = self.reach_at(speed.norm());
+        let reach = self.reach.at(speed.norm());
         square < reach * reach
     }
 }

@@ -2,6 +2,7 @@
 
 use super::near_candidates::{FaceCandidate, NearCandidates};
 use super::outfit_vertices::{OutfitVertices, surface};
+use super::pair_reach::PairReach;
 use crate::contact::{LANES, TriangleFan};
 use crate::live::outfit_model::Model;
 use crate::settings::NearPairSettings;
@@ -69,15 +70,11 @@ impl NearPairs {
         span: f32,
     ) {
         let settings = &model.config.contact.pairs;
-        let edges = model.garments.iter().map(|g| g.self_contact.edge());
-        let reach = settings.reach_edges * edges.fold(0.0, f32::max);
         let search = NearPairSearch {
             model,
             all,
             settings,
-            reach,
-            farthest: reach.max(settings.farthest),
-            span,
+            reach: PairReach::new(model, [settings.farthest, 0.0], span),
         };
         self.find_faces(&search, candidates);
         self.find_edges(&search);
@@ -206,19 +203,10 @@ struct NearPairSearch<'a> {
     model: &'a Model,
     all: &'a OutfitVertices,
     settings: &'a NearPairSettings,
-    /// Reach at rest and at most, metres.
-    reach: f32,
-    farthest: f32,
-    /// Time until the next query, s.
-    span: f32,
+    reach: PairReach,
 }
 
 impl NearPairSearch<'_> {
-    /// Reach of what closes at this speed, metres.
-    fn reach_at(&self, closing: f32) -> f32 {
-        (self.reach + closing.max(0.0) * self.span).min(self.farthest)
-    }
-
     /// Pairs of one vertex with faces. Of points on edges and corners only the nearest counts.
     fn pairs_with_faces(&self, own: &[FaceCandidate], out: &mut FaceFindings) {
         let mut nearest = (f32::INFINITY, None);
@@ -250,7 +238,7 @@ impl NearPairSearch<'_> {
 
     /// A vertex and a face within reach, by the weights of the closest point and its distance, metres.
     fn face_pair(&self, candidate: &FaceCandidate, weights: [f32; 3], d: f32) -> Option<NearPair> {
-        if d >= self.farthest || d <= self.settings.shortest {
+        if d >= self.reach.farthest || d <= self.settings.shortest {
             return None;
         }
         let (x, velocity) = (&self.all.x, &self.all.velocity);
@@ -261,7 +249,7 @@ impl NearPairSearch<'_> {
             speed += velocity[c as usize] * w;
         }
         let normal = offset / d;
-        let is_near = d < self.reach_at(-normal.dot(&speed));
+        let is_near = d < self.reach.at(-normal.dot(&speed));
         is_near.then_some(NearPair {
             vertices: [candidate.vertex, corners[0], corners[1], corners[2]],
             below: 1,
@@ -309,7 +297,7 @@ impl NearPairSearch<'_> {
         let at = |e: [u32; 2]| e.map(|v| self.all.x[v as usize]);
         let ([s, t], offset) = closest_inside(at(a), at(b), self.settings.min_sine_squared)?;
         let d = offset.norm();
-        if d >= self.farthest || d <= self.settings.shortest {
+        if d >= self.reach.farthest || d <= self.settings.shortest {
             return None;
         }
         let normal = offset / d;
@@ -320,7 +308,7 @@ impl NearPairSearch<'_> {
             below: 2,
             normal,
         };
-        let is_near = d < self.reach_at(normal.dot(&(of(a, s) - of(b, t))));
+        let is_near = d < self.reach.at(normal.dot(&(of(a, s) - of(b, t))));
         is_near.then_some(pair)
     }
 }
