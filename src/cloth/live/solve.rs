@@ -42,7 +42,7 @@ pub(super) fn solve(
     let span = (interval.span / blocks as f64) as f32;
     for index in 0..blocks {
         if index > 0 {
-            pairs.advance(model, all, span);
+            pairs.advance(model, all);
         }
         let t = index as f32 * span;
         pairs.lay(model, all, chunks, Block { t, span });

@@ -249,7 +249,7 @@ impl NearPairSearch<'_> {
             speed += velocity[c as usize] * w;
         }
         let normal = offset / d;
-        let is_near = d < self.reach.at(-normal.dot(&speed));
+        let is_near = self.reach.is_near(&normal, d, &-speed);
         is_near.then_some(NearPair {
             vertices: [candidate.vertex, corners[0], corners[1], corners[2]],
             below: 1,
@@ -308,7 +308,7 @@ impl NearPairSearch<'_> {
             below: 2,
             normal,
         };
-        let is_near = d < self.reach.at(normal.dot(&(of(a, s) - of(b, t))));
+        let is_near = self.reach.is_near(&normal, d, &(of(a, s) - of(b, t)));
         is_near.then_some(pair)
     }
 }

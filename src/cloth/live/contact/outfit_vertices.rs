@@ -74,19 +74,14 @@ impl OutfitVertices {
         model.garments[garment as usize].self_contact.edges[edge as usize].map(|v| v + first)
     }
 
-    /// Takes positions over, and a velocity by patch, vertex there and number here.
-    pub(super) fn gather(
-        &mut self,
-        model: &Model,
-        patches: &[PatchWork],
-        velocity: impl Fn(&PatchWork, usize, usize) -> V3,
-    ) {
+    /// Takes positions and velocities over.
+    pub(super) fn gather(&mut self, model: &Model, patches: &[PatchWork]) {
         let mut rest = patches.iter();
         for (k, g) in model.garments.iter().enumerate() {
             for (f, p) in g.patches.iter().zip(&mut rest) {
                 for (i, v) in f.vertices[..f.owned].iter().enumerate() {
                     let v = (self.first[k] + v) as usize;
-                    self.velocity[v] = velocity(p, i, v);
+                    self.velocity[v] = p.velocity(i);
                     self.x[v] = p.position(i);
                 }
             }

@@ -70,8 +70,6 @@ pub(in crate::live) struct PairContacts {
     candidates: NearCandidates,
     near: NearPairs,
     smoothing: Smoothing,
-    /// Positions at the beginning of the last block but one, metres.
-    last: Vec<P3>,
     /// Vertices that the body moves in the block.
     driven: Vec<bool>,
     middles: Vec<Middle>,
@@ -94,7 +92,7 @@ impl PairContacts {
         span: f32,
     ) {
         self.all.number(model);
-        self.all.gather(model, patches, |p, i, _| p.velocity(i));
+        self.all.gather(model, patches);
         self.candidates.find(model, state, &self.all, span);
         self.smoothing.surround(model, &self.all, &self.candidates);
     }
@@ -106,7 +104,7 @@ impl PairContacts {
             self.slots.clear();
             return;
         }
-        self.all.gather(model, patches, |p, i, _| p.velocity(i));
+        self.all.gather(model, patches);
         self.near.find(model, &self.all, &self.candidates, span);
         self.assign(model.config.contact.pairs.alike);
     }
@@ -116,15 +114,12 @@ impl PairContacts {
         self.near.pairs.len()
     }
 
-    /// Takes over the positions after a block of `span` seconds; velocities are the mean ones of the block.
-    pub(in crate::live) fn advance(&mut self, model: &Model, patches: &[PatchWork], span: f32) {
-        if self.near.pairs.is_empty() {
-            return;
+    /// Takes over the motion after a block. A mean velocity of the block would lag behind, and half-spaces that lag brake cloth
+    /// in free flight.
+    pub(in crate::live) fn advance(&mut self, model: &Model, patches: &[PatchWork]) {
+        if !self.near.pairs.is_empty() {
+            self.all.gather(model, patches);
         }
-        let last = &mut self.last;
-        last.clone_from(&self.all.x);
-        self.all
-            .gather(model, patches, |p, i, v| (p.position(i) - last[v]) / span);
     }
 
     /// Groups the directions of the pairs by vertex.
