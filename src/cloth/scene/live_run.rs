@@ -85,6 +85,13 @@ pub fn run(
     Ok(live.finish(times))
 }
 
+/// A scene's sheet as an outfit, at its start.
+#[cfg(test)]
+pub(crate) fn outfit(scene: &Scene) -> (Model, State) {
+    let LiveScene { model, state, .. } = LiveScene::new(scene, scene.config()).expect("a scene");
+    (model, state)
+}
+
 /// A scene as an outfit on a body.
 struct LiveScene<'a> {
     scene: &'a Scene,

@@ -10,7 +10,6 @@ use anyhow::{Context, Result, bail};
 use std::path::Path;
 use std::process::ExitCode;
 use tryon::cloth::BendingResolution;
-use tryon::cloth::settings::ResolutionSettings;
 use tryon::formats::fabric_json::parse_fabric;
 use tryon::formats::gltf::{GlbMesh, read_glb};
 use tryon::formats::mhclo::read_mhclo;
@@ -185,8 +184,7 @@ fn json(args: &ImportArgs) -> Result<()> {
         g.vertices,
         g.min_angle
     );
-    let settings = ResolutionSettings::default();
-    let (limit, _) = BendingResolution::of(&g.material, &g.rest, &settings);
+    let limit = BendingResolution::of_garment(&g);
     println!(
         "{}: bending {:.1e} and {:.1e} N·m; in real time edges of {:.0} mm carry no less than {:.1e}",
         g.material.name,

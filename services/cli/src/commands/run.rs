@@ -9,6 +9,7 @@ use anyhow::{Context, Result, ensure};
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::process::ExitCode;
+use tryon::cloth::BendingResolution;
 use tryon::formats::image::write_png_rgb;
 use tryon::formats::{RgbdSource, open_recording};
 use tryon::geometry::par::with_threads;
@@ -31,6 +32,8 @@ struct Report {
     penetration_mm: Summary,
     /// Garments off the recorded person.
     off_person: OffPersonSummary,
+    /// Bending that the mesh of each garment carries.
+    bending: BTreeMap<String, BendingResolution>,
     peak_memory_bytes: Option<u64>,
 }
 
@@ -222,6 +225,10 @@ fn dress_all(
     }
     bar.finish_and_clear();
     report.sizes = mirror.notes().to_vec();
+    let worn = mirror.outfit().map(|o| &o.model.outfit.garments);
+    report.bending = (worn.into_iter().flatten())
+        .map(|g| (g.name.clone(), BendingResolution::of_garment(g)))
+        .collect();
     Ok(measured.into_report(report))
 }
 

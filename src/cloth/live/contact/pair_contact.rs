@@ -94,7 +94,6 @@ impl PairContacts {
         self.all.number(model);
         self.all.gather(model, patches);
         self.candidates.find(model, state, &self.all, span);
-        self.smoothing.surround(model, &self.all, &self.candidates);
     }
 
     /// Finds the near pairs at the beginning of an interval of `span` seconds.
@@ -106,6 +105,7 @@ impl PairContacts {
         }
         self.all.gather(model, patches);
         self.near.find(model, &self.all, &self.candidates, span);
+        self.smoothing.surround(model, &self.all, &self.near.pairs);
         self.assign(model.config.contact.pairs.alike);
     }
 
@@ -325,7 +325,7 @@ fn half_space<'a>(
     }
 }
 
-/// Vertices whose velocities are smoothed: those of the candidates and the rings around them that smoothing reaches.
+/// Vertices whose velocities are smoothed: those of the pairs and the rings around them that smoothing reaches.
 #[derive(Debug, Default)]
 struct Smoothing {
     vertices: Vec<u32>,
@@ -337,12 +337,11 @@ struct Smoothing {
 }
 
 impl Smoothing {
-    fn surround(&mut self, model: &Model, all: &OutfitVertices, candidates: &NearCandidates) {
+    fn surround(&mut self, model: &Model, all: &OutfitVertices, pairs: &[NearPair]) {
         self.is_in.clear();
         self.is_in.resize(all.len(), false);
         self.vertices.clear();
-        let faces = candidates.faces.iter();
-        for v in faces.flat_map(|c| c.corners.into_iter().chain([c.vertex])) {
+        for v in pairs.iter().flat_map(|p| p.vertices) {
             if !std::mem::replace(&mut self.is_in[v as usize], true) {
                 self.vertices.push(v);
             }
@@ -387,6 +386,11 @@ impl Smoothing {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::scene::{live_run, parse};
+    use rand::{Rng, SeedableRng};
+    use std::fmt::Write as _;
+    use std::path::Path;
+    use tryon_geometry::spatial::closest_on_triangle;
 
     fn settings() -> NearPairSettings {
         NearPairSettings::default()
@@ -434,6 +438,74 @@ mod tests {
             )
         });
         (x, half_spaces, m.velocity)
+    }
+
+    /// A sheet of 16 by 8 cells of 2 cm as its folds of four cells, 6 mm apart and uneven, lie on each other.
+    fn folded() -> (Model, State) {
+        let mut rng = rand_pcg::Pcg32::seed_from_u64(7);
+        let (mut flat, mut at) = (String::new(), Vec::new());
+        for (i, j) in (0..=16u8).flat_map(|i| (0..=8u8).map(move |j| (i, j))) {
+            let [x, z] = [i, j].map(|k| 0.02 * f32::from(k));
+            writeln!(flat, "v {x} 0 {z}").expect("a string");
+            let (fold, along) = (i / 4, 0.02 * f32::from(i % 4));
+            let x = if fold % 2 == 0 { along } else { 0.08 - along };
+            let y = 0.006 * f32::from(fold) + rng.random_range(-0.001..0.001);
+            at.push(P3::new(x + rng.random_range(-0.003..0.003), y, z));
+        }
+        for (i, j) in (0..16).flat_map(|i| (0..8).map(move |j| (i, j))) {
+            let [a, b] = [i, i + 1].map(|i| i * 9 + j + 1);
+            writeln!(flat, "f {a} {} {b}\nf {} {} {b}", a + 1, a + 1, b + 1).expect("a string");
+        }
+        let scene = serde_json::json!({
+            "mesh_obj": flat, "colliders": [], "gravity": [0.0, 0.0, 0.0], "duration_s": 0.1, "output_fps": 60.0,
+            "material": {
+                "area_density_kg_m2": 0.2, "thickness_m": 5e-4, "young_membrane_N_m": 300.0, "poisson": 0.3,
+                "bending_rigidity_N_m": 1e-5, "friction": 0.3,
+            },
+        });
+        let scene = parse(&scene.to_string(), Path::new("folds"), None).expect("a scene");
+        let (model, mut state) = live_run::outfit(&scene);
+        state.garments[0].positions = at;
+        (model, state)
+    }
+
+    #[test]
+    fn of_folded_cloth_every_vertex_and_face_within_reach_are_a_pair() {
+        let (model, state) = folded();
+        let mut patches = Vec::new();
+        crate::live::patch::begin(&model, &state, &mut patches);
+        let mut contacts = PairContacts::default();
+        contacts.begin(&model, &state, &patches, 1.0 / 30.0);
+        contacts.query(&model, &patches, 1.0 / 120.0);
+
+        let g = &model.garments[0].self_contact;
+        let x = &state.garments[0].positions;
+        let reach = settings().reach_edges * g.edge();
+        let mut expected = 0;
+        for v in 0..x.len() as u32 {
+            let around = g.within_two_rings(v);
+            let others = g.surface.faces().iter();
+            for f in others.filter(|f| !f.iter().any(|c| *c == v || around.contains(c))) {
+                let corners = f.map(|c| x[c as usize]);
+                let at = &x[v as usize];
+                let w = closest_on_triangle(at, corners);
+                let offset = corners
+                    .iter()
+                    .zip(w)
+                    .fold(-at.coords, |sum, (c, w)| sum + c.coords * w);
+                let is_inside = w.iter().all(|w| *w > 1e-3);
+                if is_inside && offset.norm() < 0.999 * reach {
+                    let vertices = [v, f[0], f[1], f[2]];
+                    let pair = |n: &NearPair| n.below == 1 && n.vertices == vertices;
+                    assert!(
+                        contacts.near.pairs.iter().any(pair),
+                        "vertex {v}, face {f:?}"
+                    );
+                    expected += 1;
+                }
+            }
+        }
+        assert!(expected > 100, "{expected}: nothing would be tested");
     }
 
     #[test]

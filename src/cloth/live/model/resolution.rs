@@ -6,7 +6,7 @@
 
 use crate::settings::ResolutionSettings;
 use serde::Serialize;
-use tryon_garment::{Bending, Material};
+use tryon_garment::{Bending, GarmentMesh, Material};
 
 /// Resolution limit of a mesh in bending.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
@@ -43,6 +43,10 @@ impl BendingResolution {
         let mut carried = material.clone();
         carried.bending = used;
         (limit, carried)
+    }
+    /// Limit of the mesh of a garment in real time.
+    pub fn of_garment(g: &GarmentMesh) -> Self {
+        Self::of(&g.material, &g.rest, &ResolutionSettings::default()).0
     }
     /// Largest ratio of the mesh's rigidity to the fabric's, 1 where the mesh resolves it.
     pub fn stiffening(&self) -> f64 {
