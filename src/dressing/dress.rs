@@ -10,7 +10,7 @@ use std::time::Instant;
 use tryon_body::measure::measure;
 use tryon_body::{Pose, RestBody, Template};
 use tryon_cloth::{ClothError, Config, Input, Model, Outfit, State, Workspace, step};
-use tryon_garment::{GarmentMesh, Pattern};
+use tryon_garment::{GarmentMesh, Pattern, joined_faces};
 use tryon_geometry::math::{V3d, World};
 use tryon_geometry::par::{Par, join};
 use tryon_geometry::spatial::SelfIntersections;
@@ -180,11 +180,7 @@ struct CrossingFinder {
 
 impl CrossingFinder {
     fn new(model: &Model, state: &State) -> Self {
-        let (mut faces, mut first) = (Vec::new(), 0);
-        for mesh in &model.outfit.garments {
-            faces.extend(mesh.faces.iter().map(|f| f.map(|v| v + first)));
-            first += mesh.vertices as u32;
-        }
+        let faces = joined_faces(&model.outfit.garments);
         let x: Vec<V3d> = Self::positions(state).collect();
         Self {
             outfit: SelfIntersections::new(&faces, &x),
