@@ -2,10 +2,12 @@
 
 mod image;
 pub(crate) mod intrinsics;
+mod lens;
 pub(crate) mod noise;
 
 pub use image::{ColorImage, DepthImage, ImageError};
 pub use intrinsics::{Intrinsics, IntrinsicsError};
+pub use lens::{Distortion, DistortionError, Lens, LensCalibration};
 pub use noise::{
     KINECT_V1_LATERAL_SIGMA, NoiseModel, NoiseSettings, kinect_v1_axial_sigma,
     time_of_flight_axial_sigma,
