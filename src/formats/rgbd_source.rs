@@ -1,12 +1,20 @@
 //! Interface of every recording: a calibration and frames in order.
 
 use super::FormatError;
-use tryon_geometry::camera::{Calibration, RgbdFrame};
+use tryon_geometry::camera::{Calibration, LensCalibration, RgbdFrame};
 
 /// Frames of one camera, in capture order.
 pub trait RgbdSource: Send {
     /// Calibration of all frames.
     fn calibration(&self) -> &Calibration;
+    /// Calibration with the distortion that the frames still have: none, unless a reader says so.
+    fn lenses(&self) -> LensCalibration {
+        self.calibration().clone().into()
+    }
+    /// What the recording holds and no frame will have: topic or field, and why.
+    fn untaken(&self) -> &[String] {
+        &[]
+    }
     /// Number of frames, if known without reading them all.
     fn len(&self) -> Option<usize>;
     /// True if it is known to contain no frame.
