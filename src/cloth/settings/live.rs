@@ -95,6 +95,8 @@ settings! {
 
     /// Settings of contact with skin and cloth.
     pub struct ClothContactSettings {
+        /// Friction on skin over the fabric's.
+        pub skin_friction: f32 = 1.0,
         /// Rate at which anchors of strength ½ approach their target, 1/s.
         pub anchor_rate: f64 = 120.0,
         /// Largest distance at which skin is queried in an interval, metres.
