@@ -118,7 +118,7 @@ impl BodyContacts<'_> {
         let surface = self.surface();
         let reach = self.model.config.reach as f32;
         let wanted = (q.offset + reach + q.travel).min(self.model.config.contact.max_reach);
-        let around = g.self_contact.surface.neighbours(q.v).iter();
+        let around = g.topology.surface.neighbours(q.v).iter();
         let nearest = &self.garments[c.garment].nearest;
         let starts = around.map(|w| nearest[*w as usize][side]);
         let start = c.nearest[q.j][side];
@@ -200,7 +200,7 @@ impl BodyContacts<'_> {
         q: &VertexQuery,
         near: &mut [u32; 2],
     ) {
-        let around = g.self_contact.surface.neighbours(q.v);
+        let around = g.topology.surface.neighbours(q.v);
         let Some(&w) = around.get(self.frames as usize % around.len().max(1)) else {
             return;
         };
