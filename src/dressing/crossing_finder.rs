@@ -1,6 +1,7 @@
 //! Edges that pass through triangles of an outfit, of one garment or of two.
 
 use tryon_cloth::{Model, State};
+use tryon_garment::joined_faces;
 use tryon_geometry::math::V3d;
 use tryon_geometry::par::Par;
 use tryon_geometry::spatial::SelfIntersections;
@@ -13,11 +14,7 @@ pub(super) struct CrossingFinder {
 
 impl CrossingFinder {
     pub(super) fn new(model: &Model, state: &State) -> Self {
-        let (mut faces, mut first) = (Vec::new(), 0);
-        for mesh in &model.outfit.garments {
-            faces.extend(mesh.faces.iter().map(|f| f.map(|v| v + first)));
-            first += mesh.vertices as u32;
-        }
+        let faces = joined_faces(&model.outfit.garments);
         let x: Vec<V3d> = positions(state).collect();
         Self {
             outfit: SelfIntersections::new(&faces, &x),

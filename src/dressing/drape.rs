@@ -11,7 +11,7 @@ use tryon_cloth::contact::{CollisionBody, CollisionWorkspace};
 use tryon_cloth::{
     AnchorBinding, ClothError, Config, Input, Model, State, StepReport, Workspace, step,
 };
-use tryon_geometry::math::{P3, World};
+use tryon_geometry::math::{P3, V3, World};
 
 /// Body on which garments are draped.
 #[derive(Clone, Copy, Debug)]
@@ -57,6 +57,8 @@ pub(super) struct OutfitDrape {
     /// Settings with which the outfit is worn afterwards.
     worn: Config,
     work: Workspace,
+    /// Kinetic energy after the last step of relaxation.
+    energy: f32,
 }
 
 impl OutfitDrape {
@@ -83,6 +85,7 @@ impl OutfitDrape {
             settings,
             worn: *model.config(),
             work: Workspace::default(),
+            energy: 0.0,
             model,
         })
     }
@@ -93,12 +96,14 @@ impl OutfitDrape {
         let Some((first, next)) = bodies.split_first() else {
             return Ok(());
         };
-        self.limit(settings.hanging_speed, settings.skin_friction);
+        self.limit(settings.hanging_speed, settings.hanging_friction);
         for _ in 0..settings.hanging {
             self.step(first)?;
+            self.stop();
         }
 
-        self.limit(settings.following_speed, settings.skin_friction);
+        let friction = self.worn.contact.skin_friction;
+        self.limit(settings.following_speed, friction);
         next.iter().try_for_each(|body| self.step(body))
     }
 
@@ -117,16 +122,14 @@ impl OutfitDrape {
     /// Lets cloth come to rest on the body, until none passes through cloth. Leaves the state with the fewest crossings;
     /// returns their number.
     pub(super) fn settle(&mut self) -> Result<usize, ClothError> {
-        self.limit(
-            self.settings.settling_speed,
-            self.worn.contact.skin_friction,
-        );
+        let friction = self.worn.contact.skin_friction;
+        self.limit(self.settings.settling_speed, friction);
         let body = self.state.collision_body().vertices().to_vec();
         let [least, most] = self.settings.settling;
         let mut finder = CrossingFinder::new(&self.model, &self.state);
         let mut best = (finder.count(&self.state), self.state.clone());
         for k in 0..most {
-            self.step(&body)?;
+            self.relax(&body)?;
             if k < least {
                 continue;
             }
@@ -153,6 +156,32 @@ impl OutfitDrape {
         };
         config.contact.skin_friction = skin_friction;
         self.model.replace_config(config);
+    }
+
+    /// A step of dynamic relaxation with kinetic damping (Barnes 1999): cloth stops where its kinetic energy falls, as it
+    /// then passes the place where it would rest.
+    fn relax(&mut self, body: &[P3]) -> Result<(), ClothError> {
+        self.step(body)?;
+        let energy = self.kinetic_energy();
+        if energy < self.energy {
+            self.stop();
+        }
+        self.energy = self.kinetic_energy();
+        Ok(())
+    }
+
+    /// Sum of squared speeds, m²/s².
+    fn kinetic_energy(&self) -> f32 {
+        let garments = self.state.garments.iter();
+        garments
+            .flat_map(|g| &g.velocities)
+            .map(V3::norm_squared)
+            .sum()
+    }
+
+    fn stop(&mut self) {
+        let garments = self.state.garments.iter_mut();
+        garments.for_each(|g| g.velocities.fill(V3::zeros()));
     }
 
     fn step(&mut self, body: &[P3]) -> Result<(), ClothError> {

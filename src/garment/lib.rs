@@ -37,7 +37,7 @@ pub use fabric::FabricSample;
 pub use fabric_image::FabricImage;
 pub use flat_triangle::rest_area;
 pub use material::{IsotropicSolid, Material};
-pub use mesh::{AnchorKind, AnchorSet, GarmentMesh, Region, RenderMesh};
+pub use mesh::{AnchorKind, AnchorSet, GarmentMesh, Region, RenderMesh, joined_faces};
 pub use outline::{Curve, PanelEdge};
 pub use pattern::{Anchor, Dart, GarmentKind, Panel, Pattern, Placement, Seam, Side};
 pub use size::{BodyMeasures, Size, SizeRow, size_table};

@@ -111,6 +111,16 @@ pub struct RenderMesh {
     pub faces: Vec<Face>,
 }
 
+/// Triangles of all garments of an outfit, vertices numbered through.
+pub fn joined_faces(garments: &[GarmentMesh]) -> Vec<Face> {
+    let (mut faces, mut first) = (Vec::new(), 0);
+    for g in garments {
+        faces.extend(g.faces.iter().map(|f| f.map(|v| v + first)));
+        first += g.vertices as u32;
+    }
+    faces
+}
+
 /// Sewn garment.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct GarmentMesh {

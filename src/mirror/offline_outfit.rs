@@ -10,7 +10,7 @@ use tryon_cloth::fine::{
     JoinedSurfaces, MotionState, OfflineCloth, OfflineError, OfflineSettings, OfflineSolver,
     OfflineState, PinTarget, StartReport,
 };
-use tryon_garment::{GarmentMesh, GarmentSubdivision};
+use tryon_garment::{GarmentMesh, GarmentSubdivision, joined_faces};
 use tryon_geometry::math::{P3, V3d};
 use tryon_geometry::mesh::Face;
 use tryon_geometry::par::Par;
@@ -210,12 +210,8 @@ impl OfflineOutfit {
         par: Par,
         x: &mut [V3d],
     ) -> Result<StartReport, MirrorError> {
-        let (mut faces, mut first) = (Vec::new(), 0);
-        for g in garments {
-            faces.extend(g.faces.iter().map(|f| f.map(|v| v + first)));
-            first += g.vertices as u32;
-        }
-        let count = first as usize;
+        let faces = joined_faces(garments);
+        let count = garments.iter().map(|g| g.vertices).sum();
         let surface = |vertices, faces| ContactSurface { vertices, faces };
         let mesh = ContactMesh::new(
             surface(count, &faces),

@@ -134,16 +134,17 @@ impl Wearer {
 
     /// Name of a scene: motion and garments.
     pub fn scene(&self, outfit: &OutfitSpec) -> String {
+        format!("{}_{}", self.motion_name(), outfit.garments.join("+"))
+    }
+
+    fn motion_name(&self) -> String {
         let motion = self.motion.to_possible_value();
-        let name = motion.as_ref().map_or("", |m| m.get_name());
-        format!("{name}_{}", outfit.garments.join("+"))
+        motion.map_or_else(String::new, |m| m.get_name().to_owned())
     }
 
     /// Row of an outfit's report.
     pub fn row(&self, outfit: &OutfitSpec, report: &WornReport) -> Row {
-        let motion = self.motion.to_possible_value();
-        let name = motion.as_ref().map_or("", |m| m.get_name());
-        report.row(name, &outfit.garments.join("+"))
+        report.row(&self.motion_name(), &outfit.garments.join("+"))
     }
 }
 

@@ -184,7 +184,7 @@ fn json(args: &ImportArgs) -> Result<()> {
         g.vertices,
         g.min_angle
     );
-    let limit = BendingResolution::of_garment(&g);
+    let (limit, _) = BendingResolution::of_garment(&g);
     println!(
         "{}: bending {:.1e} and {:.1e} N·m; in real time edges of {:.0} mm carry no less than {:.1e}",
         g.material.name,

@@ -33,8 +33,17 @@ struct Report {
     /// Garments off the recorded person.
     off_person: OffPersonSummary,
     /// Bending that the mesh of each garment carries.
-    bending: BTreeMap<String, BendingResolution>,
+    bending: Vec<GarmentBending>,
     peak_memory_bytes: Option<u64>,
+}
+
+/// Bending that the mesh of a garment carries.
+#[derive(Debug, Serialize)]
+struct GarmentBending {
+    /// Pieces of one file may share it.
+    name: String,
+    #[serde(flatten)]
+    limit: BendingResolution,
 }
 
 /// Measurements of all frames.
@@ -227,7 +236,10 @@ fn dress_all(
     report.sizes = mirror.notes().to_vec();
     let worn = mirror.outfit().map(|o| &o.model.outfit.garments);
     report.bending = (worn.into_iter().flatten())
-        .map(|g| (g.name.clone(), BendingResolution::of_garment(g)))
+        .map(|g| GarmentBending {
+            name: g.name.clone(),
+            limit: BendingResolution::of_garment(g).0,
+        })
         .collect();
     Ok(measured.into_report(report))
 }

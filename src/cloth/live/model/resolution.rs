@@ -44,9 +44,9 @@ impl BendingResolution {
         carried.bending = used;
         (limit, carried)
     }
-    /// Limit of the mesh of a garment in real time.
-    pub fn of_garment(g: &GarmentMesh) -> Self {
-        Self::of(&g.material, &g.rest, &ResolutionSettings::default()).0
+    /// Limit of the mesh of a garment in real time, and the material that it carries.
+    pub fn of_garment(g: &GarmentMesh) -> (Self, Material) {
+        Self::of(&g.material, &g.rest, &ResolutionSettings::default())
     }
     /// Largest ratio of the mesh's rigidity to the fabric's, 1 where the mesh resolves it.
     pub fn stiffening(&self) -> f64 {

@@ -4,7 +4,7 @@ use super::bending::{Hinge, HingeSide, Wing};
 use super::membrane::Membrane;
 use super::resolution::BendingResolution;
 use crate::live::ClothError;
-use crate::settings::{AirSettings, ResolutionSettings};
+use crate::settings::AirSettings;
 use nalgebra::Matrix3x2;
 use tryon_garment::{Bending, Material};
 use tryon_geometry::math::order_statistics::percentile;
@@ -126,8 +126,7 @@ impl Sheet {
     /// # Errors
     /// As [`Sheet::new`].
     pub fn of_garment(g: &tryon_garment::GarmentMesh) -> Result<Self, ClothError> {
-        let settings = ResolutionSettings::default();
-        let (_, carried) = BendingResolution::of(&g.material, &g.rest, &settings);
+        let (_, carried) = BendingResolution::of_garment(g);
         let mut sheet = Self::new(g.vertices, &g.faces, &g.rest, &carried, None)?;
         let air = AirSettings::default();
         sheet.air = 0.5 * air.density * air.drag;

@@ -8,8 +8,8 @@ use crate::contact::SurfaceFrame;
 use crate::live::outfit_model::Model;
 use crate::live::state::{GarmentState, State};
 use crate::settings::{ClothRepairSettings, Config};
+use tryon_garment::joined_faces;
 use tryon_geometry::math::{P3, V3d};
-use tryon_geometry::mesh::Face;
 
 /// Iterations of a query.
 const ITERATIONS: usize = 8;
@@ -80,8 +80,8 @@ impl UntangleWork {
     fn untangle(&mut self, model: &Model, state: &mut State, body: &SurfaceFrame) -> usize {
         let settings = model.config.repair.untangler;
         let x = &mut self.x;
-        let outfit =
-            (self.outfit).get_or_insert_with(|| Untangler::new(&faces(model), x, settings));
+        let faces = || joined_faces(&model.outfit.garments);
+        let outfit = (self.outfit).get_or_insert_with(|| Untangler::new(&faces(), x, settings));
         outfit.invalidate();
         let mut found = 0;
         for r in 0..ITERATIONS {
@@ -113,17 +113,6 @@ impl UntangleWork {
         }
         found
     }
-}
-
-/// Faces of all garments, vertices numbered through.
-fn faces(model: &Model) -> Vec<Face> {
-    let mut faces = Vec::new();
-    let mut first = 0;
-    for g in &model.outfit.garments {
-        faces.extend(g.faces.iter().map(|f| f.map(|v| v + first)));
-        first += g.vertices as u32;
-    }
-    faces
 }
 
 impl GarmentState {
