@@ -29,11 +29,9 @@
 //! - Mass filter: [`mod@live::solver::explicit::mass_filter`].
 //! - Exchange between patches: [`mod@live::solver::explicit::halo`].
 //! - Eight floats at once: [`mod@live::solver::explicit::simd`].
-//! - XPBD: [`mod@live::solver::xpbd`].
 //! - Skin contact: [`mod@live::contact::body_contact`].
 //! - Cloth on cloth: [`mod@live::contact::pair_contact`].
-//! - Near pairs of features: [`mod@live::contact::near_candidates`], [`mod@live::contact::near_pairs`]; a hood that is put on:
-//!   [`mod@live::contact::self_contact`].
+//! - Near pairs of features: [`mod@live::contact::near_candidates`], [`mod@live::contact::near_pairs`].
 //! - Islands that sleep and wake: [`mod@live::sleep::islands`].
 //! - Thresholds: [`mod@live::sleep::criteria`].
 //! - Motion that wakes: [`mod@live::sleep::wake_source`].
@@ -86,5 +84,5 @@ mod specimens;
 pub use live::{
     AnchorBinding, BendingResolution, ClothError, Config, Element, GarmentState, Hinge, Input,
     Model, Outfit, Sheet, StagesMs, State, StepReport, Workspace, WornReference, collision_model,
-    model, self_contact, sleeve_rings, solver, step, untangler,
+    model, solver, step,
 };

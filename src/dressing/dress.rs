@@ -1,19 +1,16 @@
-//! Dressing: sew and place, drape in the tracked pose, prepare the simulator meanwhile.
+//! Dressing: sew and place, prepare the simulator, drape in it.
 
 use super::body_sections::BodySections;
+use super::drape::{OutfitDrape, Wearer};
 use super::error::DressError;
 use super::options::{DressOptions, DressReport, ms};
-use super::outfit_drape::{Wearer, drape_outfit};
-use super::settings::SettlingSettings;
-use super::sew::{GarmentSource, Sewing};
+use super::sew::{GarmentSource, PlacedSheet, Sewing};
 use std::time::Instant;
 use tryon_body::measure::measure;
 use tryon_body::{Pose, RestBody, Template};
-use tryon_cloth::{ClothError, Config, Input, Model, Outfit, State, Workspace, step};
-use tryon_garment::{GarmentMesh, Pattern, joined_faces};
-use tryon_geometry::math::{V3d, World};
-use tryon_geometry::par::{Par, join};
-use tryon_geometry::spatial::SelfIntersections;
+use tryon_cloth::{ClothError, Config, Model, Outfit, State};
+use tryon_garment::{GarmentMesh, Pattern};
+use tryon_geometry::math::{P3, World};
 
 /// A dressed body, ready for [`tryon_cloth::step`].
 #[derive(Debug)]
@@ -77,125 +74,58 @@ pub fn dress_all(
     let sheets = sewing.sew(garments)?;
     report.stages_ms.sew = ms(timer);
 
-    // The simulator is prepared while the garments are draped.
-    let meshes = sheets.iter().map(|s| s.garment.clone()).collect();
-    let config = &options.config;
+    let timer = Instant::now();
     let wearer = Wearer {
         template,
         rest,
         pose,
     };
-    let (model, draped) = join(
-        config.par,
-        || simulator(template, meshes, config),
-        || drape_outfit(&wearer, sheets, options, &mut report),
-    );
-    let (mut model, prepared) = model?;
-    let draped = draped?;
+    let drape_settings = options.stages.drape;
+    let canonical = wearer.canonical(&options.stages.sections.canonical);
+    let bodies = wearer.bodies_from(&canonical, drape_settings.following);
+    let (garments, positions) = in_world(sheets, &canonical);
+    let model = simulator(template, garments, &options.config)?;
+    report.stages_ms.model = ms(timer);
 
     let timer = Instant::now();
-    model.set_anchors(draped.anchors);
-    let mut state = State::on_body(&model, draped.positions, draped.body)?;
-    report.stages_ms.model = prepared + ms(timer);
+    let mut drape = OutfitDrape::new(model, positions, &bodies[0], drape_settings)?;
+    drape.hang_and_follow(&bodies)?;
+    report.stages_ms.drape = ms(timer);
 
     let timer = Instant::now();
-    let mut finder = CrossingFinder::new(&model, &state);
-    if options.untangle {
-        settle(
-            &mut model,
-            &mut state,
-            &mut finder,
-            &options.stages.settling,
-        )?;
-    }
-    report.crossings = finder.count(&state);
+    drape.tie(&bodies[drape_settings.following])?;
+    report.crossings = drape.settle()?;
     report.stages_ms.settle = ms(timer);
+
+    report.steps = drape.steps;
+    report.penetration = drape.last.penetration_left;
+    report.p99_strain = drape.last.p99_strain;
     report.ms = ms(started);
     Ok(Dressed {
-        model,
-        state,
+        model: drape.model,
+        state: drape.state,
         report,
     })
 }
 
-/// The model of garments that are not tied to the body yet, and the milliseconds that it took.
+/// Meshes of sheets, and their start positions around a body in a pose, world, metres.
+fn in_world(sheets: Vec<PlacedSheet>, pose: &Pose<World>) -> (Vec<GarmentMesh>, Vec<Vec<P3>>) {
+    let place = |s: PlacedSheet| {
+        let mut positions = Vec::new();
+        pose.root.points_f32(&s.positions, &mut positions);
+        (s.garment, positions)
+    };
+    sheets.into_iter().map(place).unzip()
+}
+
+/// The model of garments that are not tied to the body yet.
 fn simulator(
     template: &Template,
     garments: Vec<GarmentMesh>,
     config: &Config,
-) -> Result<(Model, f64), ClothError> {
-    let timer = Instant::now();
+) -> Result<Model, ClothError> {
     let anchors = vec![Vec::new(); garments.len()];
-    let outfit = Outfit { garments, anchors };
-    let model = Model::new(template, outfit, *config)?;
-    Ok((model, ms(timer)))
-}
-
-/// Lets cloth come to rest in the simulator, on a body that stands still: slowly, as it starts strained, and until no cloth
-/// passes through cloth. Leaves the state with the fewest crossings.
-fn settle(
-    model: &mut Model,
-    state: &mut State,
-    finder: &mut CrossingFinder,
-    settings: &SettlingSettings,
-) -> Result<(), ClothError> {
-    let gentle = Config {
-        max_speed: settings.max_speed,
-        untangle: settings.step,
-        sleep: false,
-        ..*model.config()
-    };
-    let config = model.replace_config(gentle);
-    let body = state.collision_body().vertices().to_vec();
-    let mut work = Workspace::default();
-    let input = Input {
-        body: &body,
-        dt: settings.step,
-    };
-    let [least, most] = settings.steps;
-    let mut best = (usize::MAX, State::default());
-    for k in 0..most {
-        step(model, state, &input, &mut work)?;
-        if k < least {
-            continue;
-        }
-        let crossings = finder.count(state);
-        if crossings < best.0 {
-            best = (crossings, state.clone());
-        }
-        if crossings == 0 {
-            break;
-        }
-    }
-    *state = best.1;
-    model.replace_config(config);
-    Ok(())
-}
-
-/// Finds edges that pass through triangles, of one garment or of two.
-struct CrossingFinder {
-    outfit: SelfIntersections,
-    x: Vec<V3d>,
-}
-
-impl CrossingFinder {
-    fn new(model: &Model, state: &State) -> Self {
-        let faces = joined_faces(&model.outfit.garments);
-        let x: Vec<V3d> = Self::positions(state).collect();
-        Self {
-            outfit: SelfIntersections::new(&faces, &x),
-            x,
-        }
-    }
-    fn positions(state: &State) -> impl Iterator<Item = V3d> {
-        let garments = state.garments.iter();
-        garments.flat_map(|g| g.positions.iter().map(|p| p.coords.cast()))
-    }
-    fn count(&mut self, state: &State) -> usize {
-        self.x.clear();
-        self.x.extend(Self::positions(state));
-        self.outfit.find(Par::Rayon, &self.x).len()
-    }
+    Model::new(template, Outfit { garments, anchors }, *config)
 }
 
 fn check_pose(template: &Template, pose: &Pose<World>) -> Result<(), DressError> {

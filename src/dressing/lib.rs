@@ -1,7 +1,7 @@
 //! A garment onto a body: panel placement, sewing, size choice, first drape, fit map.
 //!
-//! Panels are mapped around the body in a canonical pose, sewn and draped on a coarse mesh, moved with the body into the
-//! tracked pose, and refined. The result is a model and a state for [`tryon_cloth::step`].
+//! Panels are sewn, mapped around the body in a canonical pose, and draped by the simulator while the body moves into the
+//! tracked pose. The result is a model and a state for [`tryon_cloth::step`].
 //!
 //! ```
 //! use tryon_body::measure::measure;
@@ -32,8 +32,7 @@
 //! - Panels around trunk, legs, arms, head: [`mod@place::trunk`], [`mod@place::leg`], [`mod@place::sleeve`],
 //!   [`mod@place::hood`].
 //! - Sewing: [`mod@sew`].
-//! - First drape: [`mod@drape::step`].
-//! - Fine mesh from coarse drape: [`mod@refine`].
+//! - First drape: [`mod@drape`].
 //! - Stretch, pressure, gaps: [`mod@fit_map`].
 //! - Meshes made on another body: [`mod@mesh_garment::classifier`], [`mod@retarget`], [`mod@source_body`].
 //! - Their sizes: [`mod@mesh_garment::sizing`], [`mod@mesh_garment::grading`].
@@ -44,24 +43,20 @@ mod body_guess;
 mod body_sections;
 mod bone_map;
 mod canonical;
+mod crossing_finder;
 mod drape;
 mod dress;
 mod error;
 mod file_frame;
 mod finished;
 mod fit_map;
-mod hood;
 mod mesh_garment;
 mod options;
-mod outfit_drape;
 mod place;
-mod plane;
-mod refine;
 mod retarget;
 mod rig_standing;
 pub mod settings;
 mod sew;
-mod skin;
 mod source_body;
 mod suggest;
 mod waistband;

@@ -6,7 +6,7 @@ use tryon_cloth::Config;
 use tryon_garment::Triangulation;
 
 /// Settings of dressing.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct DressOptions {
     /// Fineness of the garments' meshes.
     pub triangulation: Triangulation,
@@ -14,29 +14,14 @@ pub struct DressOptions {
     pub config: Config,
     /// Dress in sizes that do not fit too: panels are stretched or slide, which shows as crumpled cloth.
     pub any_size: bool,
-    /// Remove self-intersections. Without, shirts take about two thirds of the time, and sleeves and trunk intersect in the
-    /// armpits.
-    pub untangle: bool,
     /// Settings of the stages.
     pub stages: StageSettings,
-}
-
-impl Default for DressOptions {
-    fn default() -> Self {
-        Self {
-            triangulation: Triangulation::default(),
-            config: Config::default(),
-            any_size: false,
-            untangle: true,
-            stages: StageSettings::default(),
-        }
-    }
 }
 
 /// Outcome of dressing.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct DressReport {
-    /// Substeps of all garments: first drape, motion to the tracked pose, fine drape.
+    /// Steps of the simulator.
     pub steps: usize,
     /// Deepest garment vertex under the skin at the end, metres.
     pub penetration: f64,
@@ -57,13 +42,11 @@ pub struct DressMs {
     pub place: f64,
     /// Triangulating and sewing, and wrapping the panels around the body.
     pub sew: f64,
-    /// Draping on the coarse mesh, canonical pose to tracked pose.
-    pub coarse: f64,
-    /// Draping on the fine mesh.
-    pub fine: f64,
-    /// Preparing the simulator, most of it while the garments are draped.
+    /// Preparing the simulator.
     pub model: f64,
-    /// Coming to rest in the simulator.
+    /// Draping from the canonical to the tracked pose.
+    pub drape: f64,
+    /// Coming to rest there.
     pub settle: f64,
 }
 

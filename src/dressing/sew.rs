@@ -9,7 +9,7 @@ use super::place::{PlacedBody, place};
 use super::suggest::check_wearable;
 use tryon_body::Template;
 use tryon_body::measure::Measurements;
-use tryon_garment::{AnchorKind, GarmentMesh, Pattern, Size, Triangulation, library};
+use tryon_garment::{AnchorKind, GarmentMesh, Pattern, Size, library};
 use tryon_geometry::math::P3;
 
 /// A garment to put on.
@@ -33,9 +33,7 @@ impl GarmentSource<'_> {
 /// A sheet of cloth and its start.
 pub(super) struct PlacedSheet {
     pub(super) garment: GarmentMesh,
-    /// The mesh that is draped first; `None` where that is the garment's own.
-    pub(super) coarse: Option<GarmentMesh>,
-    /// Start positions of the mesh that is draped first, frame of the canonical body, metres.
+    /// Start positions, frame of the canonical body, metres.
     pub(super) positions: Vec<P3>,
 }
 
@@ -66,18 +64,16 @@ impl Sewing<'_> {
         let mut sheets: Vec<PlacedSheet> = Vec::new();
         for garment in order {
             match garment {
-                GarmentSource::Pattern(p) => sheets.push(self.sew_pattern(p)?),
+                GarmentSource::Pattern(p) => sheets.push(self.sew_pattern(p, sheets.len())?),
                 GarmentSource::Mesh(m) => {
                     if let Some(finished) = m.finished() {
                         self.check(&finished, |s| m.finished_in(s))?;
                     }
-                    sheets.extend(m.retargeted(self.template, self.sections).into_iter().map(
-                        |(garment, positions)| PlacedSheet {
-                            garment,
-                            coarse: None,
-                            positions,
-                        },
-                    ))
+                    sheets.extend(
+                        m.retargeted(self.template, self.sections)
+                            .into_iter()
+                            .map(|(garment, positions)| PlacedSheet { garment, positions }),
+                    )
                 }
             }
         }
@@ -94,7 +90,8 @@ impl Sewing<'_> {
         let checked = measures.map(|m| check_wearable(garment, of_size, m));
         Ok(checked.unwrap_or(Ok(()))?)
     }
-    fn sew_pattern(&self, pattern: &Pattern) -> Result<PlacedSheet, DressError> {
+    /// A pattern around the body and `inner` garments.
+    fn sew_pattern(&self, pattern: &Pattern, inner: usize) -> Result<PlacedSheet, DressError> {
         let in_settings = |g| FinishedGarment {
             settings: self.options.stages.size,
             ..g
@@ -104,31 +101,16 @@ impl Sewing<'_> {
             Some(in_settings(FinishedGarment::from(&other)))
         };
         self.check(&in_settings(FinishedGarment::from(pattern)), of_size)?;
-        let (fine, stages) = (&self.options.triangulation, &self.options.stages);
-        let s = stages.sew;
-        let (coarser, hood_coarser, coarsest) = (s.coarser, s.hood_coarser, s.coarsest);
-        // Slim triangles are allowed: nothing is simulated on this mesh later.
-        let coarse = GarmentMesh::sew(
-            pattern,
-            &Triangulation {
-                edge_length: (fine.edge_length * coarser)
-                    .min(coarsest)
-                    .max(fine.edge_length),
-                hood_length: fine.hood_length * hood_coarser,
-                min_angle: 0.0,
-                ..*fine
-            },
-        )?;
+        let mesh = GarmentMesh::sew(pattern, &self.options.triangulation)?;
         let body = PlacedBody {
             template: self.template,
             sections: self.sections,
             pattern,
-            settings: &stages.place,
+            settings: &self.options.stages.place.over(inner),
         };
         Ok(PlacedSheet {
-            positions: place(&body, &coarse),
-            garment: GarmentMesh::sew(pattern, fine)?,
-            coarse: Some(coarse),
+            positions: place(&body, &mesh),
+            garment: mesh,
         })
     }
 }

@@ -5,46 +5,29 @@ use tryon_body::parts::BodyPart;
 use tryon_cloth::{ClothError, Model, State, StepReport, WornReference};
 use tryon_geometry::math::P3;
 
-/// Steps in a row with a sleeve off after which an outfit is put on again: cloth puts it back in the next one, or never.
-const PATIENCE: u32 = 2;
-/// Steps in which an outfit that was put on again settles: a sleeve that comes off then isn't left to cloth.
+/// Steps in which an outfit that was put on again settles.
 pub(super) const SETTLING: u32 = 4;
-/// Unfit steps of an outfit that doesn't settle after which it must be dressed anew, which takes 0.3 to 0.7 s: one second.
+/// Torn steps of an outfit that doesn't settle after which it must be dressed anew, which takes 0.4 to 1 s: one second.
 const MOST_VAIN: u32 = 30;
-
-/// Fit of an outfit after one step.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Fit {
-    /// Worn as it was put on.
-    Worn,
-    /// Part of a sleeve is off its arm: cloth puts it back in the next step.
-    SleeveOff,
-    /// Past what cloth can be, or off its limbs.
-    Torn,
-}
 
 /// Fitness of an outfit over time.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 struct WearState {
-    /// Unfit steps in a row.
-    unfit: u32,
     /// Steps since the outfit was put on again; `None` once it has settled.
     settling: Option<u32>,
-    /// Unfit steps before it settled.
+    /// Torn steps before it settled.
     vain: u32,
 }
 
 impl WearState {
-    /// Takes the result of a step; true when the outfit must be put on again.
-    fn advance(&mut self, fit: Fit, jumped: bool) -> bool {
-        let is_unfit = fit != Fit::Worn;
-        self.unfit = if is_unfit { self.unfit + 1 } else { 0 };
-        let patience = self.settling.map_or(PATIENCE, |_| 1);
-        let put_on = jumped || fit == Fit::Torn || self.unfit >= patience;
+    /// Takes the result of a step, after which the outfit may be torn: past what cloth can be, or off its limbs. True when
+    /// it must be put on again.
+    fn advance(&mut self, is_torn: bool, jumped: bool) -> bool {
+        let put_on = jumped || is_torn;
         let settled = self.settling.map(|n| n + 1).filter(|n| *n < SETTLING);
         self.settling = if put_on { Some(0) } else { settled };
         self.vain = match self.settling {
-            Some(_) => self.vain + u32::from(is_unfit),
+            Some(_) => self.vain + u32::from(is_torn),
             None => 0,
         };
         put_on
@@ -115,12 +98,7 @@ impl WearWatch {
         let settings = &self.settings;
         let is_torn = report.p99_strain > settings.most_strain
             || self.reference.limb_offset(model, state) > settings.most_offset;
-        let fit = match WornReference::lost_sleeve_rings(model, state) {
-            _ if is_torn => Fit::Torn,
-            0 => Fit::Worn,
-            _ => Fit::SleeveOff,
-        };
-        if self.state.advance(fit, jumped) {
+        if self.state.advance(is_torn, jumped) {
             self.reference.put_on(model, state);
         }
     }
@@ -130,50 +108,36 @@ impl WearWatch {
 mod tests {
     use super::*;
 
-    /// Takes `steps` of one fit; the number of times that the outfit is put on again.
-    fn run(state: &mut WearState, steps: u32, fit: Fit) -> u32 {
-        let put_on = (0..steps).map(|_| u32::from(state.advance(fit, false)));
+    /// Takes `steps` in which the outfit is torn or not; the number of times that it is put on again.
+    fn run(state: &mut WearState, steps: u32, is_torn: bool) -> u32 {
+        let put_on = (0..steps).map(|_| u32::from(state.advance(is_torn, false)));
         put_on.sum()
-    }
-
-    #[test]
-    fn a_sleeve_put_back_is_left_to_cloth_once_and_put_on_again_when_it_stays_off() {
-        let mut state = WearState::default();
-        assert_eq!(run(&mut state, PATIENCE - 1, Fit::SleeveOff), 0);
-        run(&mut state, 1, Fit::Worn);
-        assert_eq!(state, WearState::default());
-
-        assert_eq!(run(&mut state, PATIENCE, Fit::SleeveOff), 1);
-        assert_eq!(run(&mut state, SETTLING - 1, Fit::Worn), 0);
-        assert_eq!(run(&mut state, 1, Fit::SleeveOff), 1, "it had not settled");
-        run(&mut state, SETTLING, Fit::Worn);
-        assert_eq!(state, WearState::default());
     }
 
     #[test]
     fn a_torn_garment_is_put_on_again_at_once() {
         let mut state = WearState::default();
-        assert_eq!(run(&mut state, 3, Fit::Torn), 3);
+        assert_eq!(run(&mut state, 3, true), 3);
         assert_eq!((state.settling, state.vain), (Some(0), 3));
-        run(&mut state, SETTLING, Fit::Worn);
+        run(&mut state, SETTLING, false);
         assert_eq!(state, WearState::default());
     }
 
     #[test]
     fn each_jump_puts_the_outfit_on_again_and_is_no_fault() {
         let mut state = WearState::default();
-        assert!((0..50).all(|_| state.advance(Fit::Worn, true)));
+        assert!((0..50).all(|_| state.advance(false, true)));
         assert_eq!(state.vain, 0);
-        run(&mut state, SETTLING, Fit::Worn);
+        run(&mut state, SETTLING, false);
         assert_eq!(state, WearState::default());
     }
 
     #[test]
     fn an_outfit_that_never_fits_is_past_mending_until_it_fits() {
         let mut state = WearState::default();
-        assert_eq!(run(&mut state, MOST_VAIN, Fit::Torn), MOST_VAIN);
+        assert_eq!(run(&mut state, MOST_VAIN, true), MOST_VAIN);
         assert_eq!(state.vain, MOST_VAIN);
-        run(&mut state, SETTLING, Fit::Worn);
+        run(&mut state, SETTLING, false);
         assert_eq!(state, WearState::default());
     }
 }

@@ -135,36 +135,6 @@ fn every_garment_is_neither_torn_nor_crumpled_on_three_bodies() {
 }
 
 #[test]
-fn untangling_leaves_no_crossing_and_tears_nothing() {
-    let t = embedded::template();
-    for (body, shape) in BODIES {
-        let rest = person(&t, shape);
-        let shirt = suggested("tshirt")(&t, &rest);
-        let worn = |untangle| {
-            let options = DressOptions {
-                untangle,
-                ..DressOptions::default()
-            };
-            dress(&t, &rest, &arms_down(&t, &rest), &shirt, &options)
-                .expect("dressed")
-                .report
-        };
-        let (as_it_falls, free) = (worn(false), worn(true));
-        assert!(
-            as_it_falls.crossings > 20,
-            "{body}: {}",
-            as_it_falls.crossings
-        );
-        assert_eq!(free.crossings, 0, "{body}");
-        assert!(
-            free.p99_strain < as_it_falls.p99_strain + 0.015,
-            "{body}: {}",
-            free.p99_strain
-        );
-    }
-}
-
-#[test]
 fn a_fine_hood_on_a_thick_neck_has_no_crossing() {
     let t = embedded::template();
     let rest = person(&t, BODIES[2].1);
@@ -193,7 +163,7 @@ fn a_fine_hood_on_a_thick_neck_has_no_crossing() {
 }
 
 #[test]
-fn wide_hoods_need_one_attempt() {
+fn wide_hoods_have_no_crossing() {
     let t = embedded::template();
     for (body, shape) in BODIES {
         let rest = person(&t, shape);
@@ -207,8 +177,6 @@ fn wide_hoods_need_one_attempt() {
                 .expect("dressed")
                 .report;
             assert_eq!(r.crossings, 0, "{size} on {body}");
-            // A second attempt takes 170 more.
-            assert!(r.steps < 800, "{size} on {body}: {} substeps", r.steps);
         }
     }
 }

@@ -178,46 +178,11 @@ impl SurfaceModel {
         }
     }
 
-    /// The point lies on the border of an open surface, where inside and outside are undefined.
-    pub fn is_on_border(&self, c: &ClosestPoint) -> bool {
-        self.is_border_point(c.face, c.weights)
-    }
-
-    /// The same for a point of a face by its barycentric weights.
+    /// A point of a face, by its barycentric weights, lies on the border of an open surface, where inside and outside are
+    /// undefined.
     pub fn is_border_point(&self, face: u32, weights: [f32; 3]) -> bool {
         let f = self.faces[face as usize];
         (0..3).all(|k| weights[k] < self.settings.min_weight || self.border[f[k] as usize])
-    }
-
-    /// Constraint that keeps `p` below an open surface worn over it, from the closest point `hit`.
-    ///
-    /// Below a hem, at most `reach` metres away, the limit recedes from the surface by the distance beyond the hem.
-    pub fn cover(
-        &self,
-        frame: &SurfaceFrame,
-        p: &P3,
-        hit: &ClosestPoint,
-        reach: f32,
-    ) -> Option<ClosestPoint> {
-        if hit.on_part_boundary {
-            return None;
-        }
-        if !self.is_on_border(hit) {
-            return Some(*hit);
-        }
-        let smooth = self.interpolated_normal(frame, hit.face, hit.weights);
-        let normal = smooth.try_normalize(0.0)?;
-        let height = normal.dot(&(p - hit.point));
-        let beyond = (p - hit.point - normal * height).norm();
-        (beyond < reach).then(|| {
-            let point = hit.point + normal * beyond;
-            ClosestPoint {
-                point,
-                normal,
-                signed_distance: normal.dot(&(p - point)),
-                ..*hit
-            }
-        })
     }
 }
 
@@ -225,7 +190,6 @@ impl SurfaceModel {
 mod tests {
     use super::super::test_shapes::{sphere, surface};
     use super::*;
-    use tryon_geometry::mesh::TriMesh;
 
     #[test]
     fn distance_to_a_sphere_has_its_closed_form_and_the_walk_ends_at_the_nearest_vertex() {
@@ -248,32 +212,5 @@ mod tests {
             );
             assert!(walked.normal.dot(&dir) > 0.99 && !walked.on_part_boundary);
         }
-    }
-
-    #[test]
-    fn cover_recedes_below_a_hem() {
-        // A sheet at z = 0 over x in 0..1, its hem at x = 1; points below it have z < 0.
-        let v = [[0., 0., 0.], [1., 0., 0.], [1., 1., 0.], [0., 1., 0.]].map(P3::from);
-        let mesh = TriMesh::new(v.to_vec(), vec![[0, 1, 2], [0, 2, 3]]).expect("a sheet");
-        let (model, frame) = surface(&mesh, vec![1; 4]);
-        let signed = |x: f32, z: f32| {
-            let p = P3::new(x, 0.4, z);
-            let near = model.nearest_vertex(&frame, &p, 1);
-            let hit = model.closest_around(&frame, &p, near, 1);
-            let cover = model.cover(&frame, &p, &hit, 0.1);
-            cover.map(|c| c.signed_distance)
-        };
-        let close = |a: Option<f32>, b: f32| a.is_some_and(|a| (a - b).abs() < 1e-5);
-        assert!(close(signed(0.7, -0.05), -0.05), "{:?}", signed(0.7, -0.05));
-        assert!(close(signed(0.7, 0.02), 0.02), "{:?}", signed(0.7, 0.02));
-        // 4 cm below the hem it may stand out 4 cm.
-        assert!(close(signed(1.04, 0.04), 0.0), "{:?}", signed(1.04, 0.04));
-        assert!(close(signed(1.04, 0.07), 0.03), "{:?}", signed(1.04, 0.07));
-        assert_eq!(signed(1.2, 0.0), None, "too far below");
-        let boundary = ClosestPoint {
-            on_part_boundary: true,
-            ..model.closest_around(&frame, &P3::origin(), 0, 1)
-        };
-        assert_eq!(model.cover(&frame, &P3::origin(), &boundary, 0.1), None);
     }
 }

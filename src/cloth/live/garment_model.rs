@@ -1,10 +1,9 @@
 //! Immutable data of one garment in an outfit.
 
-use super::contact::self_contact::SelfContactModel;
+use super::contact::contact_topology::ContactTopology;
 use super::error::ClothError;
 use super::model::Sheet;
 use super::outfit::AnchorBinding;
-use super::repair::sleeve_rings::Sleeve;
 use super::sleep::island_model::{ISLAND, IslandModel};
 use super::solver::explicit::{PatchModel, StableSheet, StepSpec};
 use crate::contact::SurfaceModel;
@@ -33,9 +32,8 @@ pub(super) struct GarmentModel {
     pub(super) other: Vec<u8>,
     /// Distance from the skin, metres.
     pub(super) offset: f64,
-    pub(super) self_contact: SelfContactModel,
+    pub(super) topology: ContactTopology,
     pub(super) islands: IslandModel,
-    pub(super) sleeves: Vec<Sleeve>,
     /// Patch vertex and index of the binding, for each patch.
     pub(super) anchors: Vec<Vec<(u32, usize)>>,
 }
@@ -56,12 +54,11 @@ impl GarmentModel {
         let own: Vec<u8> = g.regions.iter().map(|r| r.decisive().0).collect();
         let surface = SurfaceModel::new(g.faces.clone(), g.topology()?, own.clone());
         let lengths = sheet.edges.iter().map(|e| e.1 as f32);
-        let self_contact = SelfContactModel::new(surface, lengths, config.contact.folds);
+        let topology = ContactTopology::new(surface, lengths);
         let [near, edges] = config.stillness.wake_distance;
-        let wake_distance = near + edges * self_contact.edge();
+        let wake_distance = near + edges * topology.edge();
         Ok(Self {
             islands: IslandModel::new(&patches, g.vertices, &sheet.edges, wake_distance),
-            sleeves: Sleeve::find(g, &sheet.edges, &config.repair.sleeves),
             sheet,
             patches,
             h: spec.h,
@@ -71,7 +68,7 @@ impl GarmentModel {
             other: own.iter().map(|o| Region::ALL.0 & !o).collect(),
             own,
             offset,
-            self_contact,
+            topology,
             anchors: Vec::new(),
         })
     }

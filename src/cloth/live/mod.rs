@@ -25,15 +25,12 @@ mod workspace;
 
 pub use crate::settings::Config;
 pub use collision::collision_model;
-pub use contact::self_contact;
 pub use error::ClothError;
 pub use model::{BendingResolution, Element, Hinge, Sheet};
 pub use outfit::{AnchorBinding, Outfit};
 pub use outfit_model::Model;
 pub(crate) use outfit_model::WornBody;
 pub use repair::reference::WornReference;
-pub(crate) use repair::sleeve_rings::Arms;
-pub use repair::{sleeve_rings, untangler};
 pub use report::{StagesMs, StepReport};
 pub use state::{GarmentState, State};
 pub use step::{Input, step};

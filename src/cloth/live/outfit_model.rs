@@ -6,21 +6,17 @@ use super::garment_model::GarmentModel;
 use super::model::Sheet;
 use super::model::partition::Partition;
 use super::outfit::{AnchorBinding, Outfit};
-use super::repair::sleeve_rings::Arms;
 use super::sleep::island_model::skin_clusters;
 use crate::contact::{CollisionModel, MapView};
 use crate::settings::Config;
-use tryon_body::parts::vertex_masks;
 use tryon_body::{SkinWeights, Template};
 use tryon_garment::GarmentMesh;
 use tryon_geometry::par;
 
-/// Body of an outfit: its collision model, and what cloth that lost it returns by.
+/// Body of an outfit: its collision model, and the skinning that cloth follows where it jumps.
 #[derive(Debug)]
 pub(crate) struct WornBody {
     pub(crate) collision: CollisionModel,
-    /// Centre lines that sleeves enclose.
-    pub(crate) arms: Arms,
     /// Skin weights of its vertices, and the number of joints.
     pub(crate) weights: SkinWeights,
     pub(crate) joints: usize,
@@ -36,7 +32,6 @@ pub struct Model {
     pub(super) collision: CollisionModel,
     /// Body vertices in compact clusters.
     pub(super) skin_clusters: Partition,
-    pub(super) arms: Arms,
     pub(super) weights: SkinWeights,
     pub(super) joints: usize,
     pub(super) views: [MapView; 4],
@@ -50,7 +45,6 @@ impl Model {
     pub fn new(template: &Template, outfit: Outfit, config: Config) -> Result<Self, ClothError> {
         let body = WornBody {
             collision: collision_model(template, &config)?,
-            arms: Arms::new(template, &vertex_masks(template), config.repair.sleeves),
             weights: template.weights().clone(),
             joints: template.skeleton().len(),
         };
@@ -78,7 +72,6 @@ impl Model {
         let garments = garments.into_iter().flatten().collect::<Result<_, _>>()?;
         let mut model = Self {
             skin_clusters: skin_clusters(body.collision.surface()),
-            arms: body.arms,
             weights: body.weights,
             joints: body.joints,
             views: MapView::around(config.camera_toward, config.map_detail, &config.maps),

@@ -4,7 +4,7 @@ use super::solids::Solids;
 use super::{Collider, Primitive, Scene, SceneError};
 use crate::contact::{CollisionModel, CollisionParts};
 use crate::live::{
-    AnchorBinding, Arms, ClothError, Config, Input, Model, Outfit, State, Workspace, WornBody, step,
+    AnchorBinding, ClothError, Config, Input, Model, Outfit, State, Workspace, WornBody, step,
 };
 use crate::settings::SceneSettings;
 use nalgebra::{Isometry3, Point3};
@@ -245,7 +245,6 @@ impl<'a> SceneBody<'a> {
         let mesh = TriMesh::new(at.to_vec(), faces)?;
         Ok(WornBody {
             collision: CollisionModel::new(&mesh, parts, config.collision())?,
-            arms: Arms::default(),
             weights: SkinWeights {
                 joints: vec![[0; 4]; n],
                 weights: vec![[1.0, 0.0, 0.0, 0.0]; n],

@@ -95,6 +95,8 @@ settings! {
 
     /// Settings of contact with skin and cloth.
     pub struct ClothContactSettings {
+        /// Friction on skin over the fabric's.
+        pub skin_friction: f32 = 1.0,
         /// Rate at which anchors of strength ½ approach their target, 1/s.
         pub anchor_rate: f64 = 120.0,
         /// Largest distance at which skin is queried in an interval, metres.
@@ -111,8 +113,6 @@ settings! {
         pub max_other_depth: f32 = 0.01,
         /// Cloth with cloth, as it is worn.
         pub pairs: NearPairSettings = NearPairSettings::default(),
-        /// Folds of one garment.
-        pub folds: SelfContactSettings = SelfContactSettings::default(),
     }
 
     /// Settings of contact between near pairs of features of cloth.
@@ -147,19 +147,6 @@ settings! {
         /// Relaxation of each smoothing of velocities over neighbours: by super time stepping (Alexiades et al. 1996, damping
         /// 0.05, largest eigenvalue 1.5) four smooth as far as eleven means. Unsmoothed, a shirt and a skirt shake each other.
         pub smoothing: [f32; 4] = [7.738, 1.942, 0.943, 0.692],
-    }
-
-    /// Settings of the contact of a sheet with itself.
-    pub struct SelfContactSettings {
-        /// Largest distance of a contact in edge lengths: the third ring, the first that counts as another fold, lies farther away unless a fold is
-        /// sharper than the mesh resolves.
-        pub reach_edges: f32 = 0.85,
-        /// Largest thickness between folds, in edge lengths; more holds sharp folds open.
-        pub thickness_edges: f32 = 0.25,
-        /// Margin of the candidate query beyond need, in edge lengths: motion until the next query.
-        pub margin_edges: f32 = 0.75,
-        /// Friction of cloth on cloth: below the measured 0.3, as planes renewed every interval resist sliding already.
-        pub friction: f32 = 0.1,
     }
 }
 

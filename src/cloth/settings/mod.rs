@@ -20,9 +20,8 @@ pub use fine::{
 };
 pub use live::{
     ClothContactSettings, Config, LiveStepSettings, NearPairSettings, ResolutionSettings,
-    SelfContactSettings,
 };
-pub use repair::{ClothRepairSettings, SleeveSettings, UntanglerSettings};
+pub use repair::{ClothRepairSettings, UntanglerSettings};
 pub use scene::{FabricTestSettings, SceneSettings};
 pub use solver::SolverSettings;
 pub use stillness::StillnessSettings;

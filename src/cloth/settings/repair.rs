@@ -17,8 +17,6 @@ settings! {
         pub joint_vertices: f64 = 12.0,
         /// Untangling of a sheet.
         pub untangler: UntanglerSettings = UntanglerSettings::default(),
-        /// Rings of sleeves.
-        pub sleeves: SleeveSettings = SleeveSettings::default(),
     }
 
     /// Settings of the untangling of a sheet.
@@ -36,25 +34,5 @@ settings! {
         pub steepness: f64 = 2.0,
         /// Share of its sheet's vertices below which a part that is cut off is on the wrong side.
         pub cut_off: f64 = 0.3,
-    }
-
-    /// Settings of the rings of sleeves.
-    pub struct SleeveSettings {
-        /// Distance between two rings of skin, metres.
-        pub skin_ring: f64 = 0.02,
-        /// Width of a ring of cloth, metres.
-        pub ring: f32 = 0.04,
-        /// Its least width in edge lengths: narrower ones have gaps.
-        pub ring_edges: f32 = 1.2,
-        /// Largest distance of the armhole from the shoulder along the arm, metres.
-        pub armhole: f32 = 0.3,
-        /// Largest distance of the next ring along the arm, in distances on the cloth.
-        pub max_spacing: f32 = 1.5,
-        /// Distance of a recovered ring, likewise.
-        pub recovered_spacing: f32 = 0.9,
-        /// Half the length over which the direction of an arm is taken, metres.
-        pub direction: f32 = 0.03,
-        /// Step of the scan for the nearest point of a centre line, metres.
-        pub scan: f32 = 0.005,
     }
 }

@@ -6,18 +6,15 @@ mod mesh_garment;
 mod place;
 mod sections;
 
-pub use drape::{
-    DrapeContactSettings, FollowSettings, HeldDownSettings, HoodDrapeSettings, OutfitDrapeSettings,
-    ScheduleSettings, SettlingSettings, UntangleSettings,
-};
+pub use drape::OutfitDrapeSettings;
 pub use fit::{FitMapSettings, WornSizeSettings};
 pub use mesh_garment::{
     AnchorSettings, ClassifierSettings, GarmentSurfaceSettings, GuessSettings, LiftSettings,
     MeshGarmentSettings, PieceSettings, RetargetSettings,
 };
 pub use place::{
-    HoodPlaceSettings, LegPlaceSettings, PlaceSettings, SewSettings, SkirtPlaceSettings,
-    SleevePlaceSettings, TrunkPlaceSettings, TubeSettings,
+    HoodPlaceSettings, LegPlaceSettings, PlaceSettings, SkirtPlaceSettings, SleevePlaceSettings,
+    TrunkPlaceSettings, TubeSettings,
 };
 pub use sections::{CanonicalSettings, SectionSettings};
 
@@ -28,14 +25,10 @@ settings! {
     pub struct StageSettings {
         /// Canonical pose and cross-sections of the body.
         pub sections: SectionSettings = SectionSettings::default(),
-        /// Sewing.
-        pub sew: SewSettings = SewSettings::default(),
         /// Placement of panels.
         pub place: PlaceSettings = PlaceSettings::default(),
         /// Drape.
         pub drape: OutfitDrapeSettings = OutfitDrapeSettings::default(),
-        /// Coming to rest in the simulator.
-        pub settling: SettlingSettings = SettlingSettings::default(),
         /// Sizes that patterns are worn in.
         pub size: WornSizeSettings = WornSizeSettings::default(),
     }

@@ -1,22 +1,14 @@
-//! Settings of sewing, and of the placement of panels around the canonical body.
+//! Settings of the placement of panels around the canonical body.
 
 use super::settings;
 
 settings! {
-    /// Settings of sewing.
-    pub struct SewSettings {
-        /// Edge length of the mesh that is draped first over that of the garment: four times fewer vertices.
-        pub coarser: f64 = 2.0,
-        /// The same for hoods; from shorter edges worn hoods intersect themselves more (decision 021).
-        pub hood_coarser: f64 = 2.2,
-        /// Longest edge of the mesh that is draped first, metres: longer ones lose sleeves.
-        pub coarsest: f64 = 0.045,
-    }
-
     /// Settings of the placement.
     pub struct PlaceSettings {
         /// Tubes around the body.
         pub tube: TubeSettings = TubeSettings::default(),
+        /// Additional clearance for each garment below, metres: with less, layers start in each other.
+        pub layer: f32 = 0.025,
         /// Clearance of the shoulder seam over the skin, metres: less sinks in where the shoulder is hollow.
         pub seam_clearance: f32 = 0.008,
         /// Height of a shoulder seam over bodies without shoulders, metres.
@@ -113,5 +105,15 @@ settings! {
         pub head: f32 = 0.10,
         /// Height of the nape above the shoulder line, metres.
         pub nape: f32 = 0.01,
+    }
+}
+
+impl PlaceSettings {
+    /// Settings of a garment that goes over `inner` others.
+    pub(crate) fn over(mut self, inner: usize) -> Self {
+        let more = self.layer * inner as f32;
+        self.tube.clearance += more;
+        self.seam_clearance += more;
+        self
     }
 }

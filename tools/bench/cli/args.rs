@@ -240,9 +240,6 @@ pub(crate) struct TurntableArgs {
     /// Without contact of cloth with itself.
     #[arg(long)]
     pub(crate) no_folds: bool,
-    /// Without untangling.
-    #[arg(long)]
-    pub(crate) tangled: bool,
 }
 
 /// Pose of a body of the turntable.

@@ -57,6 +57,7 @@ impl BodyContacts<'_> {
             c.clearance.fill([0.0; 2]);
         }
         let last = std::mem::take(&mut c.body_planes);
+        let friction = g.sheet.friction as f32 * self.model.config.contact.skin_friction;
         let mut last = last.iter().peekable();
         for (j, i) in c.range.clone().enumerate() {
             let mut own = std::iter::from_fn(|| last.next_if(|p| p.vertex as usize <= i))
@@ -89,7 +90,7 @@ impl BodyContacts<'_> {
             let (found, offsets) = self.share_gap(&query, found, c);
             for side in [1, 0] {
                 if let Some(hit) = &found[side] {
-                    let plane = self.plane(i as u32, hit, offsets[side], g.sheet.friction as f32);
+                    let plane = self.plane(i as u32, hit, offsets[side], friction);
                     c.body_planes.push(plane);
                 }
             }
@@ -117,7 +118,7 @@ impl BodyContacts<'_> {
         let surface = self.surface();
         let reach = self.model.config.reach as f32;
         let wanted = (q.offset + reach + q.travel).min(self.model.config.contact.max_reach);
-        let around = g.self_contact.surface.neighbours(q.v).iter();
+        let around = g.topology.surface.neighbours(q.v).iter();
         let nearest = &self.garments[c.garment].nearest;
         let starts = around.map(|w| nearest[*w as usize][side]);
         let start = c.nearest[q.j][side];
@@ -199,7 +200,7 @@ impl BodyContacts<'_> {
         q: &VertexQuery,
         near: &mut [u32; 2],
     ) {
-        let around = g.self_contact.surface.neighbours(q.v);
+        let around = g.topology.surface.neighbours(q.v);
         let Some(&w) = around.get(self.frames as usize % around.len().max(1)) else {
             return;
         };

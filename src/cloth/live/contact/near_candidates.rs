@@ -119,7 +119,7 @@ fn face_numbers(model: &Model) -> Vec<u32> {
     let mut first = vec![0];
     for g in &model.garments {
         let last = first.last().copied().unwrap_or(0);
-        first.push(last + g.self_contact.surface.faces().len() as u32);
+        first.push(last + g.topology.surface.faces().len() as u32);
     }
     first
 }
@@ -198,7 +198,7 @@ impl CandidateSearch<'_> {
         let own = all.garment_of(v);
         let is_flat = self.is_flat(v);
         if is_flat && config.self_collision {
-            let g = &self.model.garments[own as usize].self_contact;
+            let g = &self.model.garments[own as usize].topology;
             let first = all.first(own);
             for w in g.within_two_rings(v - first) {
                 out.ring_of[(w + first) as usize] = v;

@@ -161,7 +161,7 @@ impl EdgeNumbers {
         let mut first = vec![0];
         for g in &model.garments {
             let last = first.last().copied().unwrap_or(0);
-            first.push(last + g.self_contact.edges.len() as u32);
+            first.push(last + g.topology.edges.len() as u32);
         }
         Self(first)
     }
@@ -268,7 +268,7 @@ impl NearPairSearch<'_> {
         let [garment, own] = numbers.in_garment(edge);
         let ends = self.all.ends(self.model, garment, own);
         for f in ends.iter().flat_map(|v| near.of(*v)) {
-            let g = &self.model.garments[f.garment as usize].self_contact;
+            let g = &self.model.garments[f.garment as usize].topology;
             for e in g.face_edges[f.face as usize] {
                 let other = numbers.of(f.garment, e);
                 if std::mem::replace(&mut out.met[other as usize], edge) == edge {

@@ -71,7 +71,7 @@ impl OutfitVertices {
     /// Numbers of the ends of an edge.
     pub(super) fn ends(&self, model: &Model, garment: u32, edge: u32) -> [u32; 2] {
         let first = self.first(garment);
-        model.garments[garment as usize].self_contact.edges[edge as usize].map(|v| v + first)
+        model.garments[garment as usize].topology.edges[edge as usize].map(|v| v + first)
     }
 
     /// Takes positions and velocities over.
@@ -91,5 +91,5 @@ impl OutfitVertices {
 
 /// Surface of a garment.
 pub(super) fn surface(model: &Model, garment: u32) -> &SurfaceModel {
-    &model.garments[garment as usize].self_contact.surface
+    &model.garments[garment as usize].topology.surface
 }

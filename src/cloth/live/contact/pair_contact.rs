@@ -478,7 +478,7 @@ mod tests {
         contacts.begin(&model, &state, &patches, 1.0 / 30.0);
         contacts.query(&model, &patches, 1.0 / 120.0);
 
-        let g = &model.garments[0].self_contact;
+        let g = &model.garments[0].topology;
         let x = &state.garments[0].positions;
         let reach = settings().reach_edges * g.edge();
         let mut expected = 0;

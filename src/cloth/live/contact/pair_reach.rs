@@ -47,7 +47,7 @@ impl PairReach {
 
 /// Longest of the garments' edges, metres.
 pub(super) fn longest_edge(model: &Model) -> f32 {
-    let edges = model.garments.iter().map(|g| g.self_contact.edge());
+    let edges = model.garments.iter().map(|g| g.topology.edge());
     edges.fold(0.0, f32::max)
 }
 

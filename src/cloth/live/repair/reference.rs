@@ -1,9 +1,8 @@
 //! An outfit as it was put on: later states are compared with it, and return to it.
 //!
-//! Contact, untangling and the recovery of sleeves mend small faults. A body that jumps, or an arm that is tracked wrongly
+//! Contact and untangling mend small faults. A body that jumps, or an arm that is tracked wrongly
 //! for a while, leaves cloth that no step can mend; skin, however, always tells where the cloth was put on.
 
-use super::sleeve_rings::Sleeve;
 use super::teleport::{Teleport, blend};
 use crate::live::error::ClothError;
 use crate::live::outfit_model::Model;
@@ -59,17 +58,6 @@ impl WornReference {
             }
         }
         largest
-    }
-
-    /// Number of sleeve rings that do not enclose their arm.
-    pub fn lost_sleeve_rings(model: &Model, state: &State) -> usize {
-        let arms = model.arms.lines(state.body.vertices());
-        let garments = state.garments.iter().zip(&model.garments);
-        let lost = garments.map(|(g, m)| {
-            let of = |sleeve: &Sleeve| sleeve.lost_rings(&arms, |v| g.positions[v as usize]).len();
-            m.sleeves.iter().map(of).sum::<usize>()
-        });
-        lost.sum()
     }
 
     /// Puts the garments of `state` where skin carries them from the reference to its body, at rest.

@@ -4,7 +4,7 @@
 //! off, the intersection contour is shortened until it vanishes (Volino & Magnenat-Thalmann 2006, "Resolving surface
 //! collisions through intersection contour minimization").
 
-pub use crate::settings::UntanglerSettings;
+use crate::settings::UntanglerSettings;
 use tryon_geometry::math::V3d;
 use tryon_geometry::mesh::{Face, UnionFind};
 use tryon_geometry::par::Par;
@@ -17,21 +17,21 @@ const ACTIVE_RINGS: usize = 2;
 
 /// Intersections before an iteration.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct UntangleReport {
+pub(super) struct UntangleReport {
     /// Pairs of an edge and a triangle.
-    pub intersections: usize,
+    pub(super) intersections: usize,
     /// Vertices on the wrong side.
-    pub wrong_side: usize,
+    pub(super) wrong_side: usize,
 }
 
 /// Iterative untangling of one sheet, and scratch. Iterations query where the sheet intersected before, and all of it once
 /// nothing is found there.
 #[derive(Clone, Debug)]
-pub struct Untangler {
+pub(super) struct Untangler {
     /// Edges that pass through faces.
-    pub finder: SelfIntersections,
+    pub(super) finder: SelfIntersections,
     /// Displacement of each vertex in the last iteration, metres, and its weight: 0 without intersection.
-    pub displacements: Vec<(V3d, f64)>,
+    pub(super) displacements: Vec<(V3d, f64)>,
     /// Edges that intersect the sheet an odd number of times.
     odd: Vec<bool>,
     wrong_side: Vec<bool>,
@@ -81,7 +81,7 @@ struct EdgeCut {
 
 impl Untangler {
     /// Prepares a sheet at `x`, metres.
-    pub fn new(faces: &[Face], x: &[V3d], settings: UntanglerSettings) -> Self {
+    pub(super) fn new(faces: &[Face], x: &[V3d], settings: UntanglerSettings) -> Self {
         let mut new = Self {
             finder: SelfIntersections::new(faces, x),
             displacements: Vec::new(),
@@ -96,7 +96,7 @@ impl Untangler {
     }
     /// Moves every intersecting edge against its triangle by a step at most, and wrong-side ends a gap beyond. `weights` are
     /// inverse masses, 0 for fixed vertices.
-    pub fn iterate(
+    pub(super) fn iterate(
         &mut self,
         par: Par,
         x: &mut [V3d],
@@ -151,12 +151,8 @@ impl Untangler {
         }
     }
     /// Forgets where the sheet intersected: it was moved by others.
-    pub fn invalidate(&mut self) {
+    pub(super) fn invalidate(&mut self) {
         self.active = None;
-    }
-    /// Vertices of edges and triangles that intersected in the last iteration.
-    pub fn intersecting(&self) -> impl Iterator<Item = bool> {
-        self.displacements.iter().map(|p| p.1 > 0.0)
     }
     fn find(&mut self, par: Par, x: &[V3d]) -> Vec<(u32, u32)> {
         if let Some(active) = &mut self.active {
@@ -182,7 +178,7 @@ impl Untangler {
         found
     }
     /// Marks the neighbours of marked vertices too.
-    pub(super) fn grow(&self, marked: &mut [bool]) {
+    fn grow(&self, marked: &mut [bool]) {
         let edges = self.finder.edges().iter();
         let touched = edges.filter(|e| e.iter().any(|v| marked[*v as usize]));
         let ring: Vec<u32> = touched.flatten().copied().collect();
@@ -441,35 +437,6 @@ mod tests {
         let counts = untangle(strip.0, &strip.1, 60);
         assert!(counts[0] > 4, "{counts:?}");
         assert_eq!(counts.last(), Some(&0), "{counts:?}");
-    }
-
-    #[test]
-    fn local_smoothing_frees_a_spike_and_moves_nothing_else() {
-        let flat = grid(16, 16, 0, |u, v| [(u - 8.1) * CELL, 0.0, (v - 8.2) * CELL]);
-        let n = flat.0.len();
-        // A sheet above it with a spike through it.
-        let spiked = grid(16, 16, n, |u, v| {
-            let spike = if (u, v) == (8.0, 8.0) { 0.03 } else { 0.0 };
-            [(u - 8.0) * CELL, 0.02 - spike, (v - 8.0) * CELL]
-        });
-        let (mut x, faces) = two(flat, spiked);
-        let tip = n + 8 * 17 + 8;
-        let mut u = Untangler::new(&faces, &x, settings(0.001, 0.0));
-        assert!(u.iterate(Par::Seq, &mut x, |_| 1.0).intersections > 0);
-        let before = x.clone();
-        u.smooth_locally(&mut x, u.intersecting().collect(), |v| v != tip, 2);
-        assert_eq!(x[tip], before[tip], "it may not move");
-        u.smooth_locally(&mut x, u.intersecting().collect(), |_| true, 2);
-        assert!(
-            x[tip].y > before[tip].y + 0.01,
-            "{} {}",
-            x[tip].y,
-            before[tip].y
-        );
-        // Three cells from the spike, of which one is an edge that crossed.
-        let near = |v: usize| [0, 2].iter().all(|k| before[v][*k].abs() < 3.5 * CELL);
-        assert!((0..x.len()).all(|v| near(v) || x[v] == before[v]));
-        assert_eq!(u.iterate(Par::Seq, &mut x, |_| 1.0).intersections, 0);
     }
 
     #[test]

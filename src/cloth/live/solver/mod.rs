@@ -1,4 +1,3 @@
-//! Solver kernels: explicit substeps of patches, XPBD constraints.
+//! Solver kernels: explicit substeps of patches.
 
 pub mod explicit;
-pub mod xpbd;

@@ -37,7 +37,6 @@ fn options(args: &TurntableArgs, is_tracked: bool) -> DressOptions {
     };
     let mut options = DressOptions {
         any_size: args.any_size,
-        untangle: !args.tangled,
         config: Config {
             self_collision: !args.no_folds,
             ..config
@@ -85,11 +84,12 @@ impl Fitting {
         let (r, state) = (&out.dressed.report, &out.dressed.state);
         let vertices: Vec<usize> = state.garments.iter().map(|g| g.positions.len()).collect();
         println!(
-            "{body} {garment} {size}: {vertices:?} vertices, dressed in {:.0} ms, {} steps, penetration {:.1} mm, p99 stretch {:.3}; {:.0?}",
+            "{body} {garment} {size}: {vertices:?} vertices, dressed in {:.0} ms, {} steps, penetration {:.1} mm, p99 stretch {:.3}, {} crossings; {:.0?}",
             r.ms,
             r.steps,
             r.penetration * 1e3,
             r.p99_strain,
+            r.crossings,
             r.stages_ms
         );
         println!("  edges through its own triangles: {:?}", out.crossed());
