@@ -8,7 +8,7 @@
 //!
 //! Camera and files:
 //!
-//! - Recordings: [`mod@recording`], [`mod@mcap_file`], [`mod@rgbd_folder`].
+//! - Recordings: [`mod@recording`], [`mod@mcap_file`], [`mod@rgbd_folder`], [`mod@k4a_file`].
 //! - Lossless depth compression: [`mod@image::depth_codec`].
 //! - Motion clips: [`mod@bvh`], [`mod@asf_amc`].
 //! - GlTF, OBJ, MakeHuman: [`mod@gltf`], [`mod@obj`], [`mod@mhclo`].
@@ -27,6 +27,7 @@ mod foxglove;
 pub mod garmentcode;
 pub mod gltf;
 pub mod image;
+mod k4a_file;
 mod mcap_file;
 pub mod mhclo;
 pub mod morph_target;
@@ -50,6 +51,7 @@ mod sibling;
 mod texture_points;
 
 pub use error::FormatError;
+pub use k4a_file::K4aReader;
 pub use mcap_file::{McapReader, McapWriter};
 pub use motion::read_motion;
 pub use motion_clip::MotionClip;

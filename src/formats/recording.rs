@@ -1,7 +1,7 @@
-//! Recordings by their path: an RGBD folder or an MCAP file.
+//! Recordings by their path: an RGBD folder, an MCAP file or an Azure Kinect's.
 
 use super::rgbd_source::RgbdSource;
-use super::{FormatError, McapReader, RgbdFolder};
+use super::{FormatError, K4aReader, McapReader, RgbdFolder};
 use std::path::{Path, PathBuf};
 
 /// What a recording leaves to its reader.
@@ -15,7 +15,7 @@ pub struct RecordingOptions {
     pub camera: Option<PathBuf>,
 }
 
-/// Opens a recording: an RGBD folder, or a file with the extension `.mcap`.
+/// Opens a recording: an RGBD folder, or a file by its extension: `.mcap`, `.mkv`.
 ///
 /// # Errors
 /// No such file or folder, neither of both, or an unusable calibration.
@@ -35,15 +35,14 @@ pub fn open_recording_with(
     if kind.is_dir() {
         return Ok(Box::new(RgbdFolder::open(path)?));
     }
-    if path
-        .extension()
-        .is_some_and(|e| e.eq_ignore_ascii_case("mcap"))
-    {
-        return Ok(Box::new(McapReader::open(path)?));
+    let extension = path.extension().and_then(|e| e.to_str());
+    match extension.unwrap_or_default().to_ascii_lowercase().as_str() {
+        "mcap" => Ok(Box::new(McapReader::open(path)?)),
+        "mkv" => Ok(Box::new(K4aReader::open(path)?)),
+        _ => Err(FormatError::field(
+            path,
+            "recording",
+            "expected a folder with camera.json, or a file ending in .mcap or .mkv",
+        )),
     }
-    Err(FormatError::field(
-        path,
-        "recording",
-        "expected a folder with camera.json, or a file ending in .mcap",
-    ))
 }
