@@ -39,6 +39,7 @@ pub mod npz;
 pub mod obj;
 mod obj_records;
 mod obj_scene;
+mod pinholes;
 mod position_codec;
 mod private_file;
 mod recording;

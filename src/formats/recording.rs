@@ -29,11 +29,14 @@ pub fn open_recording(path: &Path) -> Result<Box<dyn RgbdSource>, FormatError> {
 /// As [`open_recording`], and a topic that the recording lacks.
 pub fn open_recording_with(
     path: &Path,
-    _options: &RecordingOptions,
+    options: &RecordingOptions,
 ) -> Result<Box<dyn RgbdSource>, FormatError> {
     let kind = std::fs::metadata(path).map_err(|e| FormatError::io(path, e))?;
     if kind.is_dir() {
-        return Ok(Box::new(RgbdFolder::open(path)?));
+        return Ok(Box::new(RgbdFolder::open_with(
+            path,
+            options.camera.as_deref(),
+        )?));
     }
     let extension = path.extension().and_then(|e| e.to_str());
     match extension.unwrap_or_default().to_ascii_lowercase().as_str() {

@@ -7,6 +7,7 @@ use super::pairs::{FramePair, PairTiming, PendingFrames};
 use super::pixels::{ColorCodec, DepthCodec};
 use crate::FormatError;
 use crate::image::check_size;
+use crate::pinholes::pinholes;
 use crate::rgbd_source::RgbdSource;
 use std::fs::File;
 use std::path::{Path, PathBuf};
@@ -66,11 +67,7 @@ impl K4aReader {
         Ok(Self {
             path: path.to_owned(),
             scanner: BlockScanner::new(path, file, &header)?,
-            calibration: Calibration {
-                depth: lenses.depth.intrinsics,
-                color: lenses.color.map(|c| c.intrinsics),
-                color_from_depth: lenses.color_from_depth,
-            },
+            calibration: pinholes(&lenses),
             lenses,
             untaken,
             depth,
