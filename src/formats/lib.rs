@@ -8,7 +8,7 @@
 //!
 //! Camera and files:
 //!
-//! - Recordings: [`mod@recording`], [`mod@mcap_file`], [`mod@rgbd_folder`], [`mod@k4a_file`].
+//! - Recordings: [`mod@recording`], [`mod@mcap_file`], [`mod@rgbd_folder`], [`mod@k4a_file`], [`mod@r3d_file`].
 //! - Lossless depth compression: [`mod@image::depth_codec`].
 //! - Motion clips: [`mod@bvh`], [`mod@asf_amc`].
 //! - GlTF, OBJ, MakeHuman: [`mod@gltf`], [`mod@obj`], [`mod@mhclo`].
@@ -21,6 +21,7 @@
 
 mod asf_amc;
 mod bvh;
+mod depth_metres;
 mod error;
 pub mod fabric_json;
 mod foxglove;
@@ -42,6 +43,7 @@ mod obj_scene;
 mod pinholes;
 mod position_codec;
 mod private_file;
+mod r3d_file;
 mod recording;
 mod rgbd_folder;
 mod rgbd_source;
@@ -50,6 +52,7 @@ pub mod sewn_obj;
 mod shared_data;
 mod sibling;
 mod texture_points;
+mod zip_entries;
 
 pub use error::FormatError;
 pub use k4a_file::K4aReader;
@@ -59,6 +62,7 @@ pub use motion_clip::MotionClip;
 pub use npy_frames::NpyFrames;
 pub use obj_scene::write_obj_scene;
 pub use position_codec::{PositionCoder, STEP as POSITION_STEP};
+pub use r3d_file::R3dReader;
 pub use recording::{RecordingOptions, open_recording, open_recording_with};
 pub use rgbd_folder::{RgbdFolder, RgbdFolderWriter, depth_to_mm, read_camera};
 pub use rgbd_source::RgbdSource;

@@ -1,7 +1,7 @@
-//! Recordings by their path: an RGBD folder, an MCAP file or an Azure Kinect's.
+//! Recordings by their path: an RGBD folder, or a file by its extension.
 
 use super::rgbd_source::RgbdSource;
-use super::{FormatError, K4aReader, McapReader, RgbdFolder};
+use super::{FormatError, K4aReader, McapReader, R3dReader, RgbdFolder};
 use std::path::{Path, PathBuf};
 
 /// What a recording leaves to its reader.
@@ -15,7 +15,8 @@ pub struct RecordingOptions {
     pub camera: Option<PathBuf>,
 }
 
-/// Opens a recording: an RGBD folder, or a file by its extension: `.mcap`, `.mkv`.
+/// Opens a recording: an RGBD folder, or a file by its extension: `.mcap`, `.mkv` (Azure Kinect),
+/// `.r3d` (Record3D).
 ///
 /// # Errors
 /// No such file or folder, neither of both, or an unusable calibration.
@@ -42,10 +43,11 @@ pub fn open_recording_with(
     match extension.unwrap_or_default().to_ascii_lowercase().as_str() {
         "mcap" => Ok(Box::new(McapReader::open(path)?)),
         "mkv" => Ok(Box::new(K4aReader::open(path)?)),
+        "r3d" => Ok(Box::new(R3dReader::open(path)?)),
         _ => Err(FormatError::field(
             path,
             "recording",
-            "expected a folder with camera.json, or a file ending in .mcap or .mkv",
+            "expected a folder with camera.json, or a file ending in .mcap, .mkv or .r3d",
         )),
     }
 }
