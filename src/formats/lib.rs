@@ -8,7 +8,8 @@
 //!
 //! Camera and files:
 //!
-//! - Recordings: [`mod@recording`], [`mod@mcap_file`], [`mod@rgbd_folder`], [`mod@k4a_file`], [`mod@r3d_file`].
+//! - Recordings: [`mod@recording`], [`mod@mcap_file`], [`mod@rgbd_folder`], [`mod@k4a_file`], [`mod@r3d_file`],
+//!   [`mod@npz_recording`].
 //! - Lossless depth compression: [`mod@image::depth_codec`].
 //! - Motion clips: [`mod@bvh`], [`mod@asf_amc`].
 //! - GlTF, OBJ, MakeHuman: [`mod@gltf`], [`mod@obj`], [`mod@mhclo`].
@@ -37,6 +38,7 @@ mod motion_clip;
 pub mod npy;
 mod npy_frames;
 pub mod npz;
+mod npz_recording;
 pub mod obj;
 mod obj_records;
 mod obj_scene;
@@ -60,6 +62,7 @@ pub use mcap_file::{McapReader, McapWriter};
 pub use motion::read_motion;
 pub use motion_clip::MotionClip;
 pub use npy_frames::NpyFrames;
+pub use npz_recording::NpzReader;
 pub use obj_scene::write_obj_scene;
 pub use position_codec::{PositionCoder, STEP as POSITION_STEP};
 pub use r3d_file::R3dReader;

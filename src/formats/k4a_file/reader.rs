@@ -8,6 +8,7 @@ use super::pixels::{ColorCodec, DepthCodec};
 use crate::FormatError;
 use crate::image::check_size;
 use crate::pinholes::pinholes;
+use crate::rgbd_folder::read_lenses;
 use crate::rgbd_source::RgbdSource;
 use std::fs::File;
 use std::path::{Path, PathBuf};
@@ -47,17 +48,33 @@ impl K4aReader {
     /// # Errors
     /// No Matroska file, no recording of an Azure Kinect, or an unusable calibration.
     pub fn open(path: &Path) -> Result<Self, FormatError> {
+        Self::open_with(path, None)
+    }
+
+    /// As [`K4aReader::open`], with a `camera.json` for a recording without its calibration.
+    ///
+    /// # Errors
+    /// As [`K4aReader::open`], and a camera of other sizes than the tracks.
+    pub fn open_with(path: &Path, camera: Option<&Path>) -> Result<Self, FormatError> {
         let mut file = File::open(path).map_err(|e| FormatError::io(path, e))?;
         let header = MatroskaHeader::read(path, &mut file)?;
         let mut untaken = Vec::new();
         let depth_track = find_depth(path, &header)?;
         let depth = depth(path, depth_track)?;
         let color = color(path, &header, &mut untaken)?;
-        let json = header.calibration.as_deref().ok_or_else(|| {
-            let why = "missing: recorded without the device's calibration";
-            FormatError::field(path, "calibration.json", why)
-        })?;
-        let lenses = lenses(path, json, depth.size, color.map(|c| c.size))?;
+        let color_size = color.map(|c| c.size);
+        let lenses = match (header.calibration.as_deref(), camera) {
+            (Some(json), _) => lenses(path, json, depth.size, color_size)?,
+            (None, Some(camera)) => camera_lenses(path, camera, depth.size, color_size)?,
+            (None, None) => {
+                let why = "missing: recorded without the device's calibration; pass `--camera camera.json`";
+                return Err(FormatError::field(path, "calibration.json", why));
+            }
+        };
+        if let Some(camera) = camera.filter(|_| header.calibration.is_some()) {
+            let name = camera.display();
+            untaken.push(format!("{name}: the recording has its own calibration"));
+        }
         untaken.extend(other_tracks(&header, depth.number));
         let timing = PairTiming {
             period_ns: depth_track.period_ns.unwrap_or(DEFAULT_PERIOD_NS),
@@ -134,6 +151,34 @@ impl K4aReader {
         let frame = self.next.saturating_sub(1);
         FormatError::field(&self.path, format!("{track}, frame {frame}"), why)
     }
+}
+
+/// Lenses of a `camera.json` whose cameras have the sizes of the tracks.
+fn camera_lenses(
+    path: &Path,
+    camera: &Path,
+    depth: (u32, u32),
+    color: Option<(u32, u32)>,
+) -> Result<LensCalibration, FormatError> {
+    let lenses = read_lenses(camera)?;
+    let calibration = pinholes(&lenses);
+    let color_camera = calibration.color.unwrap_or(calibration.depth);
+    let tracks = [
+        ("DEPTH", Some(depth), calibration.depth),
+        ("COLOR", color, color_camera),
+    ];
+    for (track, size, k) in tracks {
+        if let Some((w, h)) = size.filter(|s| *s != (k.width, k.height)) {
+            let why = format!(
+                "{w}×{h}, but {} says {}×{}",
+                camera.display(),
+                k.width,
+                k.height
+            );
+            return Err(FormatError::field(path, track, why));
+        }
+    }
+    Ok(lenses)
 }
 
 /// The track named DEPTH.

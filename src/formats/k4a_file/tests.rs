@@ -220,6 +220,23 @@ fn other_files_are_refused_by_name() {
 }
 
 #[test]
+fn a_camera_file_stands_in_for_a_missing_calibration() {
+    let tracks = [track(2, "DEPTH", b"b16g", (320, 288))];
+    let blocks = vec![block(2, 0, &depth_frame(5))];
+    let nameless = file_of(&tracks, &[tag("K4A_CALIBRATION_FILE", "b.json")], &[blocks]);
+    let (dir, reader) = open_bytes(&nameless);
+    assert!(reader.is_err());
+    let camera = dir.path().join("camera.json");
+    let text = r#"{"width": 320, "height": 288, "fx": 250, "fy": 250, "cx": 160, "cy": 144}"#;
+    fs::write(&camera, text).expect("written");
+    let open = || K4aReader::open_with(&dir.path().join("a.mkv"), Some(&camera));
+    assert_eq!(open().expect("opens").calibration().depth.fx, 250.0);
+    fs::write(&camera, text.replace("288", "240")).expect("written");
+    let e = open().expect_err("another size").to_string();
+    assert!(e.contains("`DEPTH`: 320×288, but"), "{e}");
+}
+
+#[test]
 fn reading_continues_after_damage() {
     let mut bytes = recording();
     let second = bytes

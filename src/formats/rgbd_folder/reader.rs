@@ -37,6 +37,11 @@ pub fn read_camera(path: &Path) -> Result<(Calibration, f64), FormatError> {
     Ok((pinholes(&file.lenses), file.depth_scale))
 }
 
+/// Lenses of a `camera.json`; the unit of depth is that of the recording beside it.
+pub(crate) fn read_lenses(path: &Path) -> Result<LensCalibration, FormatError> {
+    CameraFile::read(path).map(|c| c.lenses)
+}
+
 /// Converts depth in the file's unit to millimetres; values out of range become 0, "no reading".
 /// `depth_scale` is the number of units in a metre.
 pub fn depth_to_mm(image: &mut DepthImage, depth_scale: f64) {
