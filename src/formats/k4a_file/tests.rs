@@ -380,6 +380,33 @@ proptest! {
     }
 }
 
+/// A device's recording with damage in its structure: headers, calibration, and the starts of blocks.
+#[test]
+fn a_damaged_recording_of_a_device_never_panics() {
+    let Some(path) = crate::shared_data("rgbd/k4a_recording/recording.mkv") else {
+        return;
+    };
+    let whole = fs::read(path).expect("read");
+    let dir = tempfile::tempdir().expect("temporary folder");
+    let path = dir.path().join("a.mkv");
+    let mut seed = 1u64;
+    let mut next = move || {
+        seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
+        (seed >> 33) as usize
+    };
+    for case in 0..damage_cases() / 10 {
+        let mut bytes = whole.clone();
+        for _ in 0..1 + next() % 8 {
+            bytes[next() % 7000] = next() as u8;
+        }
+        if case % 4 == 0 {
+            bytes.truncate(next() % whole.len());
+        }
+        fs::write(&path, &bytes).expect("written");
+        read_all(&path);
+    }
+}
+
 /// A recording whose frames are too short, so that most of its bytes are structure.
 fn structure() -> Vec<u8> {
     let tracks = [

@@ -3,6 +3,7 @@
 use super::*;
 use crate::image::{write_png_depth, write_png_rgb};
 use crate::{RecordingOptions, open_recording, open_recording_with};
+use proptest::prelude::*;
 use std::fs;
 use std::path::Path;
 use tryon_geometry::camera::{ColorImage, DepthImage};
@@ -187,6 +188,30 @@ fn cameras_come_from_the_folder_the_option_or_the_name() {
         (frame.depth.at(9, 9), frame.time_ns),
         (1000, 1_305_031_102_160_407_000)
     );
+}
+
+proptest! {
+    /// `camera.json` and time lists with damage: an error or a folder, never a panic.
+    #[test]
+    fn damaged_texts_never_panic(
+        flips in prop::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 1..4),
+        is_camera in any::<bool>(),
+    ) {
+        let dir = folder(CAMERA);
+        depth(dir.path(), "0.png", 1000);
+        let list = "0.000000 depth/0.png\n0.033333 depth/0.png\n";
+        fs::write(dir.path().join("depth.txt"), list).expect("written");
+        let (name, text) = if is_camera { ("camera.json", CAMERA) } else { ("depth.txt", list) };
+        let mut bytes = text.as_bytes().to_vec();
+        for (at, value) in flips {
+            let at = at.index(bytes.len());
+            bytes[at] = value;
+        }
+        fs::write(dir.path().join(name), bytes).expect("written");
+        if let Ok(mut source) = open_recording(dir.path()) {
+            while !matches!(source.next_frame(), Ok(None)) {}
+        }
+    }
 }
 
 /// Folders after reports of users; the right values are in the README beside them.
