@@ -52,7 +52,10 @@ pub fn open_recording_with(
         )?)),
         "npz" => Ok(Box::new(NpzReader::open(path, options.camera.as_deref())?)),
         "oni" => Err(FormatError::field(path, "recording", NO_ONI)),
-        "r3d" => Ok(Box::new(R3dReader::open(path)?)),
+        "r3d" => Ok(Box::new(R3dReader::open_with(
+            path,
+            options.camera.as_deref(),
+        )?)),
         _ => Err(FormatError::field(
             path,
             "recording",

@@ -7,6 +7,7 @@ use crate::image::{MAX_PIXELS, check_size, decode_jpeg};
 use crate::rgbd_source::RgbdSource;
 use crate::zip_entries::{ZipFileArchive, open_zip, read_entry};
 use lzfse_rust::LzfseRingDecoder;
+use std::collections::HashSet;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 use tryon_geometry::camera::{Calibration, ColorImage, DepthImage, RgbdFrame};
@@ -49,6 +50,14 @@ impl R3dReader {
     /// # Errors
     /// No zip archive, no `metadata` or an unusable field of it, or no depth.
     pub fn open(path: &Path) -> Result<Self, FormatError> {
+        Self::open_with(path, None)
+    }
+
+    /// As [`R3dReader::open`]; a `camera.json` is noted as unused, since every recording has its `K`.
+    ///
+    /// # Errors
+    /// As [`R3dReader::open`].
+    pub fn open_with(path: &Path, camera: Option<&Path>) -> Result<Self, FormatError> {
         let mut zip = open_zip(path)?;
         let bytes = read_entry(path, &mut zip, "metadata", MAX_METADATA)?;
         let mut metadata = R3dMetadata::parse(path, &bytes)?;
@@ -66,14 +75,21 @@ impl R3dReader {
         if frames.is_empty() {
             return Err(FormatError::field(path, "rgbd", "no rgbd/N.depth"));
         }
+        let names: HashSet<&str> = zip.file_names().collect();
         let has_color = frames
             .iter()
-            .map(|f| zip.by_name(&color_name(*f)).is_ok())
-            .collect();
+            .map(|f| names.contains(color_name(*f).as_str()));
+        let has_color = has_color.collect();
         if zip.file_names().any(|n| n.ends_with(".conf")) {
             metadata
                 .notes
                 .push("rgbd/N.conf: confidence is not used".to_owned());
+        }
+        if let Some(camera) = camera {
+            let name = camera.display();
+            metadata
+                .notes
+                .push(format!("{name}: the recording has its own K"));
         }
         Ok(Self {
             path: path.to_owned(),
