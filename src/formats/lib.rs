@@ -8,7 +8,8 @@
 //!
 //! Camera and files:
 //!
-//! - Recordings: [`mod@recording`], [`mod@mcap_file`], [`mod@rgbd_folder`].
+//! - Recordings: [`mod@recording`], [`mod@mcap_file`], [`mod@rgbd_folder`], [`mod@k4a_file`], [`mod@r3d_file`],
+//!   [`mod@npz_recording`].
 //! - Lossless depth compression: [`mod@image::depth_codec`].
 //! - Motion clips: [`mod@bvh`], [`mod@asf_amc`].
 //! - GlTF, OBJ, MakeHuman: [`mod@gltf`], [`mod@obj`], [`mod@mhclo`].
@@ -21,12 +22,14 @@
 
 mod asf_amc;
 mod bvh;
+mod depth_metres;
 mod error;
 pub mod fabric_json;
 mod foxglove;
 pub mod garmentcode;
 pub mod gltf;
 pub mod image;
+mod k4a_file;
 mod mcap_file;
 pub mod mhclo;
 pub mod morph_target;
@@ -35,11 +38,14 @@ mod motion_clip;
 pub mod npy;
 mod npy_frames;
 pub mod npz;
+mod npz_recording;
 pub mod obj;
 mod obj_records;
 mod obj_scene;
+mod pinholes;
 mod position_codec;
 mod private_file;
+mod r3d_file;
 mod recording;
 mod rgbd_folder;
 mod rgbd_source;
@@ -48,14 +54,18 @@ pub mod sewn_obj;
 mod shared_data;
 mod sibling;
 mod texture_points;
+mod zip_entries;
 
 pub use error::FormatError;
+pub use k4a_file::K4aReader;
 pub use mcap_file::{McapReader, McapWriter};
 pub use motion::read_motion;
 pub use motion_clip::MotionClip;
 pub use npy_frames::NpyFrames;
+pub use npz_recording::NpzReader;
 pub use obj_scene::write_obj_scene;
 pub use position_codec::{PositionCoder, STEP as POSITION_STEP};
+pub use r3d_file::R3dReader;
 pub use recording::{RecordingOptions, open_recording, open_recording_with};
 pub use rgbd_folder::{RgbdFolder, RgbdFolderWriter, depth_to_mm, read_camera};
 pub use rgbd_source::RgbdSource;

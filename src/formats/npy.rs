@@ -47,6 +47,10 @@ pub fn read_npy(path: &Path) -> Result<(Vec<u64>, Vec<f32>), FormatError> {
         let why = "it is longer than the file";
         return Err(FormatError::field(path, "header length", why));
     };
+    if !is_flat_header(&bytes[..start]) {
+        let why = "it nests more than an array's";
+        return Err(FormatError::field(path, "header", why));
+    }
     let header = npyz::NpyFile::new(&bytes[..]).map_err(io)?;
     let shape = header.shape().to_vec();
     let descr = header.dtype().descr();
@@ -106,6 +110,13 @@ pub(super) fn data_start(bytes: &[u8]) -> Option<usize> {
         [_, _, a, b, c, d] => 12usize.checked_add(u32::from_le_bytes([*a, *b, *c, *d]) as usize),
         _ => None,
     }
+}
+
+/// True if a header nests no deeper than an array's does: the parser of its Python literal recurses with every bracket.
+pub(super) fn is_flat_header(header: &[u8]) -> bool {
+    const MAX_BRACKETS: usize = 16;
+    let opening = header.iter().filter(|b| b"([{".contains(b));
+    opening.count() <= MAX_BRACKETS
 }
 
 /// Value of an IEEE 754 binary16 number.

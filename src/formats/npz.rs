@@ -124,6 +124,9 @@ impl Archive<'_> {
         if header_end > bytes.len() {
             return Err(fault("its header is longer than the array".into()));
         }
+        if !super::npy::is_flat_header(&bytes[..header_end]) {
+            return Err(fault("its header nests more than an array's".into()));
+        }
         let header = NpyHeader::from_reader(&bytes[..])
             .map_err(|e| fault(format!("is not a numpy array ({e})")))?;
         let item = match header.dtype() {

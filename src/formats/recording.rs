@@ -1,7 +1,7 @@
-//! Recordings by their path: an RGBD folder or an MCAP file.
+//! Recordings by their path: an RGBD folder, or a file by its extension.
 
 use super::rgbd_source::RgbdSource;
-use super::{FormatError, McapReader, RgbdFolder};
+use super::{FormatError, K4aReader, McapReader, NpzReader, R3dReader, RgbdFolder};
 use std::path::{Path, PathBuf};
 
 /// What a recording leaves to its reader.
@@ -15,7 +15,12 @@ pub struct RecordingOptions {
     pub camera: Option<PathBuf>,
 }
 
-/// Opens a recording: an RGBD folder, or a file with the extension `.mcap`.
+/// Way around OpenNI's recordings, whose depth is in codecs of their own.
+const NO_ONI: &str = "OpenNI's .oni is not read: play it with OpenNI 2 (in Python, openni2.Device.open_file), save its \
+    frames as depth/N.png (16-bit millimetres) and rgb/N.png beside a camera.json, and pass that folder";
+
+/// Opens a recording: an RGBD folder, or a file by its extension: `.mcap`, `.mkv` (Azure Kinect),
+/// `.npz` or `.r3d` (Record3D).
 ///
 /// # Errors
 /// No such file or folder, neither of both, or an unusable calibration.
@@ -29,21 +34,48 @@ pub fn open_recording(path: &Path) -> Result<Box<dyn RgbdSource>, FormatError> {
 /// As [`open_recording`], and a topic that the recording lacks.
 pub fn open_recording_with(
     path: &Path,
-    _options: &RecordingOptions,
+    options: &RecordingOptions,
 ) -> Result<Box<dyn RgbdSource>, FormatError> {
     let kind = std::fs::metadata(path).map_err(|e| FormatError::io(path, e))?;
     if kind.is_dir() {
-        return Ok(Box::new(RgbdFolder::open(path)?));
+        return Ok(Box::new(RgbdFolder::open_with(
+            path,
+            options.camera.as_deref(),
+        )?));
     }
-    if path
-        .extension()
-        .is_some_and(|e| e.eq_ignore_ascii_case("mcap"))
-    {
-        return Ok(Box::new(McapReader::open(path)?));
+    let extension = path.extension().and_then(|e| e.to_str());
+    match extension.unwrap_or_default().to_ascii_lowercase().as_str() {
+        "mcap" => Ok(Box::new(McapReader::open(path)?)),
+        "mkv" => Ok(Box::new(K4aReader::open_with(
+            path,
+            options.camera.as_deref(),
+        )?)),
+        "npz" => Ok(Box::new(NpzReader::open(path, options.camera.as_deref())?)),
+        "oni" => Err(FormatError::field(path, "recording", NO_ONI)),
+        "r3d" => Ok(Box::new(R3dReader::open_with(
+            path,
+            options.camera.as_deref(),
+        )?)),
+        _ => Err(FormatError::field(
+            path,
+            "recording",
+            "expected a folder with camera.json, or a file ending in .mcap, .mkv, .npz or .r3d",
+        )),
     }
-    Err(FormatError::field(
-        path,
-        "recording",
-        "expected a folder with camera.json, or a file ending in .mcap",
-    ))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn files_that_are_not_read_name_the_way_around() {
+        let dir = tempfile::tempdir().expect("temporary folder");
+        for (name, way) in [("a.ONI", "depth/N.png"), ("a.avi", ".mkv, .npz or .r3d")] {
+            let path = dir.path().join(name);
+            std::fs::write(&path, b"NI10").expect("written");
+            let e = open_recording(&path).err().expect("must be refused");
+            assert!(e.to_string().contains(way), "{e}");
+        }
+    }
 }

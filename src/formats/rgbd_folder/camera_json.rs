@@ -1,13 +1,14 @@
 //! `camera.json`: `{width, height, fx, fy, cx, cy, depth_scale}` and, for a separate colour camera,
 //! `color: {width, height, fx, fy, cx, cy}` and `color_from_depth: {translation: [x, y, z], rotation: [x, y, z, w]}`.
+//! Either camera may have a `distortion`: coefficients in OpenCV's order.
 
 use crate::FormatError;
 use crate::image::read_limited;
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 use serde_json::{Map, Value, json};
 use std::path::Path;
-use tryon_geometry::camera::{Calibration, Intrinsics};
-use tryon_geometry::math::Rigid;
+use tryon_geometry::camera::{Distortion, Intrinsics, Lens, LensCalibration};
+use tryon_geometry::math::{Camera, ColorCamera, Rigid};
 
 /// Largest file, bytes; a calibration has a few hundred.
 const MAX_BYTES: u64 = 1 << 20;
@@ -18,11 +19,14 @@ const DEFAULT_SCALE: f64 = 1000.0;
 /// Largest deviation of a quaternion's length from one; written with six digits it is within 1e-5.
 const UNIT_TOLERANCE: f64 = 1e-3;
 
-/// Calibration and the unit of the depth images.
+/// Fewest units in a metre that are a depth camera's, and most metres a unit: a decimetre.
+const COARSEST: f64 = 10.0;
+
+/// Lenses and the unit of the depth images.
 #[derive(Clone, Debug)]
 pub(super) struct CameraFile {
-    /// Calibration.
-    pub(super) calibration: Calibration,
+    /// Both cameras, distortion included.
+    pub(super) lenses: LensCalibration,
     /// Units per metre.
     pub(super) depth_scale: f64,
 }
@@ -41,53 +45,29 @@ impl CameraFile {
         let Value::Object(map) = &value else {
             return Err(FormatError::field(path, "json", "expected an object"));
         };
-        let depth = intrinsics(path, "", map)?;
-        let depth_scale = match map.get("depth_scale") {
-            None => DEFAULT_SCALE,
-            Some(v) => number(path, "depth_scale", v)?,
-        };
-        if !(depth_scale.is_finite() && depth_scale > 0.0) {
-            let why = format!("{depth_scale}, expected a positive number of units per metre");
-            return Err(FormatError::field(path, "depth_scale", why));
-        }
         let color = match map.get("color") {
             None | Some(Value::Null) => None,
-            Some(Value::Object(c)) => Some(intrinsics(path, "color.", c)?),
+            Some(Value::Object(c)) => Some(lens(path, "color.", c)?),
             Some(_) => return Err(FormatError::field(path, "color", "expected an object")),
         };
-        let color_from_depth = match map.get("color_from_depth") {
-            None | Some(Value::Null) => Rigid::identity(),
-            Some(v) => {
-                let t: [f64; 3] =
-                    numbers(path, "color_from_depth.translation", v.get("translation"))?;
-                let q: [f64; 4] = numbers(path, "color_from_depth.rotation", v.get("rotation"))?;
-                let q = Quaternion::new(q[3], q[0], q[1], q[2]);
-                if (q.norm() - 1.0).abs() > UNIT_TOLERANCE {
-                    let why = format!("length {}, expected a unit quaternion x, y, z, w", q.norm());
-                    return Err(FormatError::field(path, "color_from_depth.rotation", why));
-                }
-                Rigid::from_parts(Vector3::from(t), UnitQuaternion::from_quaternion(q))
-            }
-        };
         Ok(Self {
-            calibration: Calibration {
-                depth,
+            lenses: LensCalibration {
+                depth: lens(path, "", map)?,
                 color,
-                color_from_depth,
+                color_from_depth: color_from_depth(path, map)?,
             },
-            depth_scale,
+            depth_scale: depth_scale(path, map)?,
         })
     }
 
     /// Text of the file.
     pub(super) fn to_json(&self) -> String {
-        let fields = |k: &Intrinsics| json!({"width": k.width, "height": k.height, "fx": k.fx, "fy": k.fy, "cx": k.cx, "cy": k.cy});
-        let mut root = fields(&self.calibration.depth);
+        let mut root = lens_json(&self.lenses.depth);
         root["depth_scale"] = json!(self.depth_scale);
-        if let Some(c) = &self.calibration.color {
-            let iso = self.calibration.color_from_depth.iso();
+        if let Some(c) = &self.lenses.color {
+            let iso = self.lenses.color_from_depth.iso();
             let q = iso.rotation.coords;
-            root["color"] = fields(c);
+            root["color"] = lens_json(c);
             root["color_from_depth"] = json!({
                 "translation": iso.translation.vector.as_slice(),
                 "rotation": [q.x, q.y, q.z, q.w],
@@ -95,6 +75,55 @@ impl CameraFile {
         }
         format!("{root:#}\n")
     }
+}
+
+fn lens_json(lens: &Lens) -> Value {
+    let k = &lens.intrinsics;
+    let mut out = json!({"width": k.width, "height": k.height, "fx": k.fx, "fy": k.fy, "cx": k.cx, "cy": k.cy});
+    if !lens.distortion.is_none() {
+        let ([k1, k2, k3, k4, k5, k6], [p1, p2]) =
+            (lens.distortion.radial, lens.distortion.tangential);
+        out["distortion"] = json!([k1, k2, p1, p2, k3, k4, k5, k6]);
+    }
+    out
+}
+
+/// Units per metre. Numbers below one are metres per unit, as librealsense states it (0.001 for millimetres).
+fn depth_scale(path: &Path, map: &Map<String, Value>) -> Result<f64, FormatError> {
+    const FIELD: &str = "depth_scale";
+    let stated = match map.get(FIELD) {
+        None => DEFAULT_SCALE,
+        Some(v) => number(path, FIELD, v)?,
+    };
+    if stated.is_finite() && stated >= COARSEST {
+        return Ok(stated);
+    }
+    if stated > 0.0 && stated <= 1.0 / COARSEST && (1.0 / stated).is_finite() {
+        return Ok(1.0 / stated);
+    }
+    let why = format!(
+        "{stated}, expected units per metre (1000 for millimetres) or metres per unit (0.001)"
+    );
+    Err(FormatError::field(path, FIELD, why))
+}
+
+fn color_from_depth(
+    path: &Path,
+    map: &Map<String, Value>,
+) -> Result<Rigid<ColorCamera, Camera>, FormatError> {
+    let v = match map.get("color_from_depth") {
+        None | Some(Value::Null) => return Ok(Rigid::identity()),
+        Some(v) => v,
+    };
+    let t: [f64; 3] = numbers(path, "color_from_depth.translation", v.get("translation"))?;
+    let q: [f64; 4] = numbers(path, "color_from_depth.rotation", v.get("rotation"))?;
+    let q = Quaternion::new(q[3], q[0], q[1], q[2]);
+    if (q.norm() - 1.0).abs() > UNIT_TOLERANCE {
+        let why = format!("length {}, expected a unit quaternion x, y, z, w", q.norm());
+        return Err(FormatError::field(path, "color_from_depth.rotation", why));
+    }
+    let rotation = UnitQuaternion::from_quaternion(q);
+    Ok(Rigid::from_parts(Vector3::from(t), rotation))
 }
 
 /// Key whose value is a bare NaN or Infinity.
@@ -138,6 +167,32 @@ fn numbers<const N: usize>(
     Ok(out)
 }
 
+fn lens(path: &Path, prefix: &str, map: &Map<String, Value>) -> Result<Lens, FormatError> {
+    Ok(Lens {
+        intrinsics: intrinsics(path, prefix, map)?,
+        distortion: distortion(path, prefix, map)?,
+    })
+}
+
+fn distortion(
+    path: &Path,
+    prefix: &str,
+    map: &Map<String, Value>,
+) -> Result<Distortion, FormatError> {
+    let field = format!("{prefix}distortion");
+    let list = match map.get("distortion") {
+        None | Some(Value::Null) => return Ok(Distortion::default()),
+        Some(Value::Array(list)) => list,
+        Some(_) => return Err(FormatError::field(path, field, "expected an array")),
+    };
+    let coefficients: Vec<f64> = list
+        .iter()
+        .map(|v| number(path, &field, v))
+        .collect::<Result<_, _>>()?;
+    Distortion::from_opencv(&coefficients)
+        .map_err(|e| FormatError::field(path, field, e.to_string()))
+}
+
 fn intrinsics(
     path: &Path,
     prefix: &str,
@@ -169,6 +224,13 @@ fn intrinsics(
         cx: get("cx")?,
         cy: get("cy")?,
     };
+    if k.fy < 0.0 && k.fx > 0.0 {
+        let why = format!(
+            "{}: negative as ICL-NUIM states it, whose y axis points up; rows point down here, write {}",
+            k.fy, -k.fy
+        );
+        return Err(FormatError::field(path, format!("{prefix}fy"), why));
+    }
     k.validated().map_err(|e| {
         FormatError::field(
             path,

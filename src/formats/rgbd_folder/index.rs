@@ -1,5 +1,7 @@
 //! Files of each frame, by time lists or by name.
 
+use super::names::{nanoseconds, natural_order, stem};
+use super::pairing::{ImageList, pair_colors};
 use crate::FormatError;
 use crate::image::read_limited;
 use std::path::Path;
@@ -10,9 +12,8 @@ const MAX_LIST_BYTES: u64 = 256 << 20;
 /// Frame period of images without a time list, that of most depth cameras.
 const DEFAULT_PERIOD_NS: u64 = 1_000_000_000 / 30;
 
-/// Largest time between colour and its depth, nanoseconds: half a period at 15 Hz, the slowest tracking rate. Older
-/// colour shows another pose.
-const MAX_GAP_NS: u64 = 33_400_000;
+/// Folders of colour.
+const COLOR_FOLDERS: [&str; 2] = ["rgb", "color"];
 
 /// The files of one frame, relative to the folder.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -21,59 +22,99 @@ pub(super) struct Entry {
     pub(super) time_ns: u64,
     /// Depth image.
     pub(super) depth: String,
-    /// Colour image nearest in time.
+    /// Colour image of the same exposure.
     pub(super) color: Option<String>,
 }
 
-/// Frames of a folder, sorted by time.
-pub(super) fn entries(folder: &Path) -> Result<Vec<Entry>, FormatError> {
-    let depth = images(folder, "depth", &["png"])?;
-    if depth.is_empty() {
-        return Err(FormatError::field(
-            folder,
-            "depth",
-            "no depth images: expected depth/*.png and perhaps depth.txt",
-        ));
-    }
-    let color = images(folder, "rgb", &["png", "jpg", "jpeg"])?;
-    Ok(depth
-        .into_iter()
-        .map(|(time_ns, file)| Entry {
+/// Frames of a folder.
+#[derive(Clone, Debug)]
+pub(super) struct FolderIndex {
+    /// Frames, sorted by time.
+    pub(super) entries: Vec<Entry>,
+    /// Images that no frame has, and why.
+    pub(super) notes: Vec<String>,
+}
+
+impl FolderIndex {
+    /// Lists the images of a folder and pairs them.
+    pub(super) fn read(folder: &Path) -> Result<Self, FormatError> {
+        let depth = images(folder, "depth", &["png"])?;
+        if depth.images.is_empty() {
+            return Err(FormatError::field(
+                folder,
+                "depth",
+                "no depth images: expected depth/*.png and perhaps depth.txt",
+            ));
+        }
+        let (mut colors, mut notes) = (vec![None; depth.images.len()], Vec::new());
+        if let Some((name, color)) = color_images(folder)? {
+            let (found, note) = pair_colors(&depth, &color);
+            colors = found;
+            notes.extend(note.map(|why| format!("{name}: {why}")));
+        }
+        let images = depth.images.into_iter().zip(colors);
+        let entries = images.map(|((time_ns, depth), color)| Entry {
             time_ns,
-            depth: file,
-            color: nearest(&color, time_ns).map(str::to_owned),
+            depth,
+            color,
+        });
+        Ok(Self {
+            entries: entries.collect(),
+            notes,
         })
-        .collect())
+    }
 }
 
-/// Image nearest in time, within [`MAX_GAP_NS`].
-fn nearest(list: &[(u64, String)], time_ns: u64) -> Option<&str> {
-    let after = list.partition_point(|(t, _)| *t < time_ns);
-    let candidates = [after.checked_sub(1), Some(after)];
-    let gap = |i: &usize| list[*i].0.abs_diff(time_ns);
-    let best = candidates
-        .into_iter()
-        .flatten()
-        .filter(|&i| i < list.len())
-        .min_by_key(gap)?;
-    (gap(&best) <= MAX_GAP_NS).then_some(list[best].1.as_str())
+/// Colour images and the folder they are in; `None` if there are none.
+fn color_images(folder: &Path) -> Result<Option<(&'static str, ImageList)>, FormatError> {
+    let mut found = Vec::new();
+    for name in COLOR_FOLDERS {
+        let list = images(folder, name, &["png", "jpg", "jpeg"])?;
+        if !list.images.is_empty() {
+            found.push((name, list));
+        }
+    }
+    if found.len() > 1 {
+        let why = "both hold images: keep the folder of the colour that belongs to depth/";
+        return Err(FormatError::field(folder, "rgb, color", why));
+    }
+    Ok(found.pop())
 }
 
-/// Images of `NAME.txt` if it exists, else the sorted files of `NAME/` at 30 Hz. Sorted by time.
-fn images(
-    folder: &Path,
-    name: &str,
-    extensions: &[&str],
-) -> Result<Vec<(u64, String)>, FormatError> {
+/// Images of `NAME.txt` if it exists, else the files of `NAME/` in the order of their numbers, at the times that are
+/// their names, or at 30 Hz.
+fn images(folder: &Path, name: &str, extensions: &[&str]) -> Result<ImageList, FormatError> {
     let list = folder.join(format!("{name}.txt"));
     if list.exists() {
-        return time_list(&list);
+        return Ok(ImageList {
+            images: time_list(&list)?,
+            has_times: true,
+        });
     }
+    let mut files = image_files(folder, name, extensions)?;
+    files.sort_by(|a, b| natural_order(a, b));
+    let seconds = |file: &String| {
+        let stem = stem(file);
+        stem.contains('.').then(|| nanoseconds(stem)).flatten()
+    };
+    let times: Option<Vec<u64>> = files.iter().map(seconds).collect();
+    let has_times = times.is_some();
+    let times = times.unwrap_or_else(|| {
+        let made_up = (0..files.len()).map(|i| i as u64 * DEFAULT_PERIOD_NS);
+        made_up.collect()
+    });
+    let mut images: Vec<(u64, String)> = times.into_iter().zip(files).collect();
+    images.sort_by_key(|(time, _)| *time);
+    Ok(ImageList { images, has_times })
+}
+
+/// Files of `NAME/` with one of the extensions; none if there is no such folder.
+fn image_files(folder: &Path, name: &str, extensions: &[&str]) -> Result<Vec<String>, FormatError> {
     let dir = folder.join(name);
-    if !dir.exists() {
-        return Ok(Vec::new());
-    }
     let mut files = Vec::new();
+    if !dir.exists() {
+        return Ok(files);
+    }
     for item in std::fs::read_dir(&dir).map_err(|e| FormatError::io(&dir, e))? {
         let path = item.map_err(|e| FormatError::io(&dir, e))?.path();
         let extension = path
@@ -87,12 +128,7 @@ fn images(
             files.push(format!("{name}/{file}"));
         }
     }
-    files.sort();
-    Ok(files
-        .into_iter()
-        .enumerate()
-        .map(|(i, f)| (i as u64 * DEFAULT_PERIOD_NS, f))
-        .collect())
+    Ok(files)
 }
 
 /// Lines of `timestamp path`, seconds with a fraction; `#` starts a comment.
@@ -121,54 +157,4 @@ fn time_list(path: &Path) -> Result<Vec<(u64, String)>, FormatError> {
     }
     out.sort();
     Ok(out)
-}
-
-/// Parses decimal seconds as nanoseconds, digit by digit: f64 cannot hold nanoseconds since 1970.
-fn nanoseconds(text: &str) -> Option<u64> {
-    let (whole, fraction) = text.split_once('.').unwrap_or((text, ""));
-    let digits = |s: &str| s.bytes().all(|b| b.is_ascii_digit());
-    if whole.is_empty() || !digits(whole) || !digits(fraction) {
-        return None;
-    }
-    let nanos: String = fraction
-        .chars()
-        .chain(std::iter::repeat('0'))
-        .take(9)
-        .collect();
-    whole
-        .parse::<u64>()
-        .ok()?
-        .checked_mul(1_000_000_000)?
-        .checked_add(nanos.parse().ok()?)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn seconds_keep_every_digit() {
-        assert_eq!(
-            nanoseconds("1305031102.175304"),
-            Some(1_305_031_102_175_304_000)
-        );
-        assert_eq!(nanoseconds("0.033333"), Some(33_333_000));
-        assert_eq!(nanoseconds("7"), Some(7_000_000_000));
-        for bad in ["", ".5", "-1", "nan", "1e3", "99999999999999"] {
-            assert_eq!(nanoseconds(bad), None, "{bad}");
-        }
-    }
-
-    #[test]
-    fn colour_is_the_nearest_in_time_within_the_gap() {
-        let list: Vec<(u64, String)> = [0u64, 33, 66, 300]
-            .iter()
-            .map(|t| (t * 1_000_000, format!("{t}")))
-            .collect();
-        assert_eq!(nearest(&list, 40_000_000), Some("33"));
-        assert_eq!(nearest(&list, 52_000_000), Some("66"));
-        assert_eq!(nearest(&list, 150_000_000), None);
-        assert_eq!(nearest(&list, 320_000_000), Some("300"));
-        assert_eq!(nearest(&[], 0), None);
-    }
 }

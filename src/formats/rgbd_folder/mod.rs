@@ -1,12 +1,18 @@
-//! RGBD folders: `camera.json`, `depth/*.png`, `rgb/*.png|jpg`, and time lists as in the TUM RGB-D benchmark.
+//! RGBD folders: `camera.json`, `depth/*.png`, colour in `rgb/` or `color/`, and time lists as in the TUM RGB-D benchmark.
 
 mod camera_json;
+mod datasets;
 mod index;
+mod names;
+mod pairing;
 mod reader;
 mod writer;
 
+pub(crate) use reader::read_lenses;
 pub use reader::{RgbdFolder, depth_to_mm, read_camera};
 pub use writer::RgbdFolderWriter;
 
+#[cfg(test)]
+mod layout_tests;
 #[cfg(test)]
 mod tests;

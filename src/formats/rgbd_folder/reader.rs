@@ -1,28 +1,45 @@
 //! RGBD folders, read frame by frame.
 
 use super::camera_json::CameraFile;
-use super::index::{Entry, entries};
+use super::datasets::camera_of;
+use super::index::{Entry, FolderIndex};
 use crate::FormatError;
 use crate::image::{read_color, read_png_depth};
+use crate::pinholes::pinholes;
 use crate::rgbd_source::RgbdSource;
 use std::path::{Path, PathBuf};
-use tryon_geometry::camera::{Calibration, DepthImage, Intrinsics, RgbdFrame};
+use tryon_geometry::camera::{
+    Calibration, ColorImage, DepthImage, Intrinsics, LensCalibration, RgbdFrame,
+};
 
 /// An RGBD folder, read frame by frame.
 #[derive(Debug)]
 pub struct RgbdFolder {
     folder: PathBuf,
     camera: CameraFile,
+    calibration: Calibration,
     entries: Vec<Entry>,
+    untaken: Vec<String>,
     next: usize,
 }
 
-/// Calibration and depth scale of a `camera.json` (`tryon composite --camera`).
+/// Calibration and depth scale (units per metre) of a `camera.json` without distortion (`tryon composite --camera`).
 ///
 /// # Errors
 /// Names the file and the field at fault.
 pub fn read_camera(path: &Path) -> Result<(Calibration, f64), FormatError> {
-    CameraFile::read(path).map(|c| (c.calibration, c.depth_scale))
+    let file = CameraFile::read(path)?;
+    let color = file.lenses.color.is_none_or(|c| c.distortion.is_none());
+    if !(color && file.lenses.depth.distortion.is_none()) {
+        let why = "an image pair is read as a pinhole's: undistort it, and leave this out";
+        return Err(FormatError::field(path, "distortion", why));
+    }
+    Ok((pinholes(&file.lenses), file.depth_scale))
+}
+
+/// Lenses of a `camera.json`; the unit of depth is that of the recording beside it.
+pub(crate) fn read_lenses(path: &Path) -> Result<LensCalibration, FormatError> {
+    CameraFile::read(path).map(|c| c.lenses)
 }
 
 /// Converts depth in the file's unit to millimetres; values out of range become 0, "no reading".
@@ -48,15 +65,101 @@ impl RgbdFolder {
     /// Reads calibration and time lists; images are read with their frame.
     ///
     /// # Errors
-    /// No or bad `camera.json`, a bad line of a time list, or no depth image.
+    /// No or bad `camera.json`, a bad line of a time list, no depth image, or images of another size than it says.
     pub fn open(folder: &Path) -> Result<Self, FormatError> {
-        let camera = CameraFile::read(&folder.join("camera.json"))?;
-        let entries = entries(folder)?;
-        Ok(Self {
+        Self::open_with(folder, None)
+    }
+
+    /// As [`RgbdFolder::open`], with a `camera.json` for folders that have none.
+    ///
+    /// # Errors
+    /// As [`RgbdFolder::open`].
+    pub fn open_with(folder: &Path, camera: Option<&Path>) -> Result<Self, FormatError> {
+        let own = folder.join("camera.json");
+        let file = match camera {
+            _ if own.exists() => CameraFile::read(&own)?,
+            Some(camera) => CameraFile::read(camera)?,
+            None => camera_of(folder).ok_or_else(|| {
+                let why = "missing: pass the camera's with `--camera camera.json`";
+                FormatError::field(&own, "file", why)
+            })?,
+        };
+        let FolderIndex { entries, mut notes } = FolderIndex::read(folder)?;
+        if let Some(camera) = camera.filter(|_| own.exists()) {
+            notes.push(format!(
+                "{}: the folder has its own camera.json",
+                camera.display()
+            ));
+        }
+        let out = Self {
             folder: folder.to_owned(),
-            camera,
+            calibration: pinholes(&file.lenses),
+            camera: file,
             entries,
+            untaken: notes,
             next: 0,
+        };
+        out.check_sizes()?;
+        Ok(out)
+    }
+
+    /// Checks the sizes of the first and the last frame: if both are wrong, all are. Damage is left to its frame.
+    fn check_sizes(&self) -> Result<(), FormatError> {
+        let [Some(first), Some(last)] = [self.entries.first(), self.entries.last()] else {
+            return Ok(());
+        };
+        let depth = |entry: &Entry| {
+            let path = self.folder.join(&entry.depth);
+            read_png_depth(&path).map_or(Ok(()), |image| self.check_depth(&path, &image))
+        };
+        depth(first).or_else(|e| depth(last).map_err(|_| e))?;
+        let color = |entry: Option<&Entry>| {
+            let Some(file) = entry.and_then(|e| e.color.as_ref()) else {
+                return Ok(());
+            };
+            let path = self.folder.join(file);
+            read_color(&path).map_or(Ok(()), |image| self.check_color(&path, &image))
+        };
+        let has_color = |entry: &&Entry| entry.color.is_some();
+        let last = self.entries.iter().rfind(has_color);
+        color(self.entries.iter().find(has_color)).or_else(|e| color(last).map_err(|_| e))
+    }
+
+    fn check_depth(&self, path: &Path, image: &DepthImage) -> Result<(), FormatError> {
+        let size = (image.width(), image.height());
+        check(path, "depth size", size, &self.calibration.depth)
+    }
+
+    fn check_color(&self, path: &Path, image: &ColorImage) -> Result<(), FormatError> {
+        let size = (image.width(), image.height());
+        let camera = self.calibration.color.as_ref();
+        check(
+            path,
+            "colour size",
+            size,
+            camera.unwrap_or(&self.calibration.depth),
+        )
+    }
+
+    fn read_frame(&self, entry: &Entry, sequence: u64) -> Result<RgbdFrame, FormatError> {
+        let path = self.folder.join(&entry.depth);
+        let mut depth = read_png_depth(&path)?;
+        self.check_depth(&path, &depth)?;
+        depth_to_mm(&mut depth, self.camera.depth_scale);
+        let color = match &entry.color {
+            None => None,
+            Some(file) => {
+                let path = self.folder.join(file);
+                let color = read_color(&path)?;
+                self.check_color(&path, &color)?;
+                Some(color)
+            }
+        };
+        Ok(RgbdFrame {
+            sequence,
+            time_ns: entry.time_ns,
+            depth,
+            color,
         })
     }
 }
@@ -66,8 +169,12 @@ fn check(path: &Path, field: &str, got: (u32, u32), want: &Intrinsics) -> Result
     if got == (want.width, want.height) {
         return Ok(());
     }
+    let hint = match field {
+        "colour size" => " (colour of its own size needs a `color` section)",
+        _ => "",
+    };
     let why = format!(
-        "{}×{}, but camera.json says {}×{}",
+        "{}×{}, but camera.json says {}×{}{hint}",
         got.0, got.1, want.width, want.height
     );
     Err(FormatError::field(path, field, why))
@@ -75,48 +182,24 @@ fn check(path: &Path, field: &str, got: (u32, u32), want: &Intrinsics) -> Result
 
 impl RgbdSource for RgbdFolder {
     fn calibration(&self) -> &Calibration {
-        &self.camera.calibration
+        &self.calibration
+    }
+    fn lenses(&self) -> LensCalibration {
+        self.camera.lenses.clone()
+    }
+    fn untaken(&self) -> &[String] {
+        &self.untaken
     }
     fn len(&self) -> Option<usize> {
         Some(self.entries.len())
     }
     fn next_frame(&mut self) -> Result<Option<RgbdFrame>, FormatError> {
-        let Some(entry) = self.entries.get(self.next) else {
+        let sequence = self.next;
+        let Some(entry) = self.entries.get(sequence) else {
             return Ok(None);
         };
-        let sequence = self.next as u64;
         self.next += 1;
-        let path = self.folder.join(&entry.depth);
-        let mut depth = read_png_depth(&path)?;
-        let calibration = &self.camera.calibration;
-        check(
-            &path,
-            "depth size",
-            (depth.width(), depth.height()),
-            &calibration.depth,
-        )?;
-        depth_to_mm(&mut depth, self.camera.depth_scale);
-        let color = match &entry.color {
-            None => None,
-            Some(file) => {
-                let path = self.folder.join(file);
-                let color = read_color(&path)?;
-                let camera = calibration.color.as_ref().unwrap_or(&calibration.depth);
-                check(
-                    &path,
-                    "colour size",
-                    (color.width(), color.height()),
-                    camera,
-                )?;
-                Some(color)
-            }
-        };
-        Ok(Some(RgbdFrame {
-            sequence,
-            time_ns: entry.time_ns,
-            depth,
-            color,
-        }))
+        self.read_frame(entry, sequence as u64).map(Some)
     }
     fn rewind(&mut self) -> Result<(), FormatError> {
         self.next = 0;

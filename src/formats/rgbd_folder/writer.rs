@@ -42,7 +42,7 @@ impl RgbdFolderWriter {
         let depth = folder.join("depth");
         private_file::create_folders(&depth).map_err(|e| FormatError::io(&depth, e))?;
         let file = CameraFile {
-            calibration: calibration.clone(),
+            lenses: calibration.clone().into(),
             depth_scale: 1000.0,
         };
         write(&camera, file.to_json().as_bytes())?;

@@ -40,9 +40,9 @@ pub(crate) fn run(args: &ImportArgs) -> Result<ExitCode> {
         }
         "json" => json(args)?,
         "mhclo" => clothes(args)?,
-        "mcap" | "" => recording(args)?,
+        "mcap" | "mkv" | "r3d" | "" => recording(args)?,
         other => bail!(
-            "{}: .{other} is not known; bodies are .npz, garments .obj, .glb or .json, recordings .mcap or a folder",
+            "{}: .{other} is not known; bodies are .npz, garments .obj, .glb or .json, recordings .mcap, .mkv, .r3d or a folder",
             path.display()
         ),
     }
