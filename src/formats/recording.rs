@@ -4,7 +4,7 @@ use super::rgbd_source::RgbdSource;
 use super::{FormatError, K4aReader, McapReader, NpzReader, R3dReader, RgbdFolder};
 use std::path::{Path, PathBuf};
 
-/// What a recording leaves to its reader.
+/// Choices that a recording leaves to its reader.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct RecordingOptions {
     /// Topic of depth, where a file has several.

@@ -11,7 +11,7 @@ pub trait RgbdSource: Send {
     fn lenses(&self) -> LensCalibration {
         self.calibration().clone().into()
     }
-    /// What the recording holds and no frame will have: topic or field, and why.
+    /// Topics and fields that the recording holds and no frame will have, and why.
     fn untaken(&self) -> &[String] {
         &[]
     }

@@ -3,7 +3,7 @@
 use super::{WireError, required};
 use crate::v1;
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
-use tryon_geometry::camera::{Calibration, Intrinsics};
+use tryon_geometry::camera::{Calibration, Distortion, Intrinsics, Lens};
 use tryon_geometry::math::Rigid;
 
 /// Largest error of a quaternion's norm: f32 senders are off by 1e-7, wrong scales by far more.
@@ -101,6 +101,22 @@ fn intrinsics_to_wire(k: &Intrinsics) -> v1::Intrinsics {
         cx: k.cx,
         cy: k.cy,
     }
+}
+
+/// Lens with valid intrinsics and distortion.
+///
+/// # Errors
+/// Names the field out of range.
+pub fn lens_from_wire(l: &v1::Lens, field: &str) -> Result<Lens, WireError> {
+    let of = |part: &str| format!("{field}.{part}");
+    let distortion = Distortion::from_opencv(&l.distortion);
+    Ok(Lens {
+        intrinsics: intrinsics(
+            &required(l.intrinsics, &of("intrinsics"))?,
+            &of("intrinsics"),
+        )?,
+        distortion: distortion.map_err(|e| WireError::new(of("distortion"), e.to_string()))?,
+    })
 }
 
 /// Calibration with valid intrinsics.

@@ -367,7 +367,7 @@ pub struct CameraInfo {
     /// Name, unique within the process, and camera part of its bus keys.
     #[prost(string, tag = "2")]
     pub camera: ::prost::alloc::string::String,
-    /// Source of the frames: "synth", or the file name of a recording.
+    /// Source of the frames: "synth", the file name of a recording, or "push" and the device that its sender names.
     #[prost(string, tag = "3")]
     pub source: ::prost::alloc::string::String,
     #[prost(enumeration = "CameraState", tag = "4")]
@@ -473,6 +473,81 @@ pub struct StopRecordingResponse {
     #[prost(uint64, tag = "3")]
     pub dropped: u64,
 }
+/// A camera as it is made: a pinhole behind glass.
+#[derive(Clone, PartialEq, ::prost::Message)]
+pub struct Lens {
+    #[prost(message, optional, tag = "1")]
+    pub intrinsics: ::core::option::Option<Intrinsics>,
+    /// OpenCV's k1, k2, p1, p2, k3, k4, k5, k6 (Brown-Conrady, rational): none, four, five or eight.
+    #[prost(double, repeated, tag = "2")]
+    pub distortion: ::prost::alloc::vec::Vec<f64>,
+}
+#[derive(Clone, PartialEq, ::prost::Message)]
+pub struct CameraDescription {
+    #[prost(string, tag = "1")]
+    pub camera: ::prost::alloc::string::String,
+    /// Depth camera; required.
+    #[prost(message, optional, tag = "2")]
+    pub depth: ::core::option::Option<Lens>,
+    /// Colour camera; absent when there is no colour or it is registered pixel by pixel to depth.
+    #[prost(message, optional, tag = "3")]
+    pub color: ::core::option::Option<Lens>,
+    /// From the depth camera to the colour camera; absent means identity.
+    #[prost(message, optional, tag = "4")]
+    pub color_from_depth: ::core::option::Option<RigidTransform>,
+    /// Length of a unit of depth, metres: 0.001 for millimetres. 1e-5 to 0.1.
+    #[prost(double, tag = "5")]
+    pub depth_unit: f64,
+    /// Model and serial number, for people; at most 64 bytes.
+    #[prost(string, tag = "6")]
+    pub device: ::prost::alloc::string::String,
+}
+#[derive(Clone, PartialEq, Eq, Hash, ::prost::Message)]
+pub struct CameraFrame {
+    /// Number given by the sender; answers name it.
+    #[prost(uint64, tag = "1")]
+    pub number: u64,
+    /// Exposure time, nanoseconds of the camera's clock.
+    #[prost(uint64, tag = "2")]
+    pub capture_time_ns: u64,
+    /// u16 little endian, row-major, of the size of the depth camera; 0 = no reading.
+    #[prost(bytes = "bytes", tag = "3")]
+    pub depth: ::prost::bytes::Bytes,
+    /// As `color_encoding` says, of the size of the colour camera, else of the depth camera.
+    #[prost(bytes = "bytes", tag = "4")]
+    pub color: ::prost::bytes::Bytes,
+    #[prost(enumeration = "ColorEncoding", tag = "5")]
+    pub color_encoding: i32,
+}
+#[derive(Clone, PartialEq, ::prost::Message)]
+pub struct PublishFramesRequest {
+    #[prost(oneof = "publish_frames_request::Content", tags = "1, 2")]
+    pub content: ::core::option::Option<publish_frames_request::Content>,
+}
+/// Nested message and enum types in `PublishFramesRequest`.
+pub mod publish_frames_request {
+    #[derive(Clone, PartialEq, ::prost::Oneof)]
+    pub enum Content {
+        /// First message, and no other.
+        #[prost(message, tag = "1")]
+        Description(super::CameraDescription),
+        #[prost(message, tag = "2")]
+        Frame(super::CameraFrame),
+    }
+}
+#[derive(Clone, PartialEq, Eq, Hash, ::prost::Message)]
+pub struct PublishFramesResponse {
+    #[prost(uint64, tag = "1")]
+    pub number: u64,
+    #[prost(enumeration = "FrameOutcome", tag = "2")]
+    pub outcome: i32,
+    /// Reason of REFUSED, for people; empty otherwise.
+    #[prost(string, tag = "3")]
+    pub detail: ::prost::alloc::string::String,
+    /// Frames of this call replaced so far.
+    #[prost(uint64, tag = "4")]
+    pub replaced: u64,
+}
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, ::prost::Enumeration)]
 #[repr(i32)]
 pub enum CameraState {
@@ -507,6 +582,85 @@ impl CameraState {
             "CAMERA_STATE_RUNNING" => Some(Self::Running),
             "CAMERA_STATE_ENDED" => Some(Self::Ended),
             "CAMERA_STATE_FAILED" => Some(Self::Failed),
+            _ => None,
+        }
+    }
+}
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, ::prost::Enumeration)]
+#[repr(i32)]
+pub enum ColorEncoding {
+    /// No colour.
+    Unspecified = 0,
+    /// Three bytes a pixel: red, green, blue.
+    Rgb8 = 1,
+    /// Three bytes a pixel: blue, green, red.
+    Bgr8 = 2,
+    /// A baseline JPEG of the size of the colour camera.
+    Jpeg = 3,
+    /// Two bytes a pixel: Y, U, Y, V of each pair (BT.601, full range, as UVC cameras send).
+    Yuyv = 4,
+}
+impl ColorEncoding {
+    /// String value of the enum field names used in the ProtoBuf definition.
+    ///
+    /// The values are not transformed in any way and thus are considered stable
+    /// (if the ProtoBuf definition does not change) and safe for programmatic use.
+    pub fn as_str_name(&self) -> &'static str {
+        match self {
+            Self::Unspecified => "COLOR_ENCODING_UNSPECIFIED",
+            Self::Rgb8 => "COLOR_ENCODING_RGB8",
+            Self::Bgr8 => "COLOR_ENCODING_BGR8",
+            Self::Jpeg => "COLOR_ENCODING_JPEG",
+            Self::Yuyv => "COLOR_ENCODING_YUYV",
+        }
+    }
+    /// Creates an enum from field names used in the ProtoBuf definition.
+    pub fn from_str_name(value: &str) -> ::core::option::Option<Self> {
+        match value {
+            "COLOR_ENCODING_UNSPECIFIED" => Some(Self::Unspecified),
+            "COLOR_ENCODING_RGB8" => Some(Self::Rgb8),
+            "COLOR_ENCODING_BGR8" => Some(Self::Bgr8),
+            "COLOR_ENCODING_JPEG" => Some(Self::Jpeg),
+            "COLOR_ENCODING_YUYV" => Some(Self::Yuyv),
+            _ => None,
+        }
+    }
+}
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, ::prost::Enumeration)]
+#[repr(i32)]
+pub enum FrameOutcome {
+    Unspecified = 0,
+    /// Read, and on its way.
+    Taken = 1,
+    /// A newer one came before it was read.
+    Replaced = 2,
+    /// Nobody consents to be seen and nothing is recorded.
+    Unwatched = 3,
+    /// Unreadable; `detail` has the reason.
+    Refused = 4,
+}
+impl FrameOutcome {
+    /// String value of the enum field names used in the ProtoBuf definition.
+    ///
+    /// The values are not transformed in any way and thus are considered stable
+    /// (if the ProtoBuf definition does not change) and safe for programmatic use.
+    pub fn as_str_name(&self) -> &'static str {
+        match self {
+            Self::Unspecified => "FRAME_OUTCOME_UNSPECIFIED",
+            Self::Taken => "FRAME_OUTCOME_TAKEN",
+            Self::Replaced => "FRAME_OUTCOME_REPLACED",
+            Self::Unwatched => "FRAME_OUTCOME_UNWATCHED",
+            Self::Refused => "FRAME_OUTCOME_REFUSED",
+        }
+    }
+    /// Creates an enum from field names used in the ProtoBuf definition.
+    pub fn from_str_name(value: &str) -> ::core::option::Option<Self> {
+        match value {
+            "FRAME_OUTCOME_UNSPECIFIED" => Some(Self::Unspecified),
+            "FRAME_OUTCOME_TAKEN" => Some(Self::Taken),
+            "FRAME_OUTCOME_REPLACED" => Some(Self::Replaced),
+            "FRAME_OUTCOME_UNWATCHED" => Some(Self::Unwatched),
+            "FRAME_OUTCOME_REFUSED" => Some(Self::Refused),
             _ => None,
         }
     }
@@ -788,6 +942,38 @@ pub mod capture_service_client {
                 .insert(GrpcMethod::new("tryon.v1.CaptureService", "StopRecording"));
             self.inner.unary(req, path, codec).await
         }
+        /// Feeds a camera whose `source` is "push", from whatever program reads the device. The first message describes the
+        /// camera, the others are its frames. The camera runs from the first to the end of the stream, each time under a new epoch.
+        /// Every frame is answered once it is taken, replaced by a newer one, unwatched or refused; who waits for the answer before
+        /// the next frame is never behind. Unwatched frames are forgotten unread: nobody consents to be seen, and nothing is recorded.
+        /// The newest caller feeds a camera: the call before ends with ABORTED. INVALID_ARGUMENT names the field of a description, or
+        /// of a frame that doesn't fit it; NOT_FOUND for an unknown camera; FAILED_PRECONDITION for one of another source.
+        pub async fn publish_frames(
+            &mut self,
+            request: impl tonic::IntoStreamingRequest<
+                Message = super::PublishFramesRequest,
+            >,
+        ) -> std::result::Result<
+            tonic::Response<tonic::codec::Streaming<super::PublishFramesResponse>>,
+            tonic::Status,
+        > {
+            self.inner
+                .ready()
+                .await
+                .map_err(|e| {
+                    tonic::Status::unknown(
+                        format!("Service was not ready: {}", e.into()),
+                    )
+                })?;
+            let codec = tonic_prost::ProstCodec::default();
+            let path = http::uri::PathAndQuery::from_static(
+                "/tryon.v1.CaptureService/PublishFrames",
+            );
+            let mut req = request.into_streaming_request();
+            req.extensions_mut()
+                .insert(GrpcMethod::new("tryon.v1.CaptureService", "PublishFrames"));
+            self.inner.streaming(req, path, codec).await
+        }
     }
 }
 /// Generated server implementations.
@@ -867,6 +1053,25 @@ pub mod capture_service_server {
             request: tonic::Request<super::StopRecordingRequest>,
         ) -> std::result::Result<
             tonic::Response<super::StopRecordingResponse>,
+            tonic::Status,
+        >;
+        /// Server streaming response type for the PublishFrames method.
+        type PublishFramesStream: tonic::codegen::tokio_stream::Stream<
+                Item = std::result::Result<super::PublishFramesResponse, tonic::Status>,
+            >
+            + std::marker::Send
+            + 'static;
+        /// Feeds a camera whose `source` is "push", from whatever program reads the device. The first message describes the
+        /// camera, the others are its frames. The camera runs from the first to the end of the stream, each time under a new epoch.
+        /// Every frame is answered once it is taken, replaced by a newer one, unwatched or refused; who waits for the answer before
+        /// the next frame is never behind. Unwatched frames are forgotten unread: nobody consents to be seen, and nothing is recorded.
+        /// The newest caller feeds a camera: the call before ends with ABORTED. INVALID_ARGUMENT names the field of a description, or
+        /// of a frame that doesn't fit it; NOT_FOUND for an unknown camera; FAILED_PRECONDITION for one of another source.
+        async fn publish_frames(
+            &self,
+            request: tonic::Request<tonic::Streaming<super::PublishFramesRequest>>,
+        ) -> std::result::Result<
+            tonic::Response<Self::PublishFramesStream>,
             tonic::Status,
         >;
     }
@@ -1260,6 +1465,54 @@ pub mod capture_service_server {
                                 max_encoding_message_size,
                             );
                         let res = grpc.unary(method, req).await;
+                        Ok(res)
+                    };
+                    Box::pin(fut)
+                }
+                "/tryon.v1.CaptureService/PublishFrames" => {
+                    #[allow(non_camel_case_types)]
+                    struct PublishFramesSvc<T: CaptureService>(pub Arc<T>);
+                    impl<
+                        T: CaptureService,
+                    > tonic::server::StreamingService<super::PublishFramesRequest>
+                    for PublishFramesSvc<T> {
+                        type Response = super::PublishFramesResponse;
+                        type ResponseStream = T::PublishFramesStream;
+                        type Future = BoxFuture<
+                            tonic::Response<Self::ResponseStream>,
+                            tonic::Status,
+                        >;
+                        fn call(
+                            &mut self,
+                            request: tonic::Request<
+                                tonic::Streaming<super::PublishFramesRequest>,
+                            >,
+                        ) -> Self::Future {
+                            let inner = Arc::clone(&self.0);
+                            let fut = async move {
+                                <T as CaptureService>::publish_frames(&inner, request).await
+                            };
+                            Box::pin(fut)
+                        }
+                    }
+                    let accept_compression_encodings = self.accept_compression_encodings;
+                    let send_compression_encodings = self.send_compression_encodings;
+                    let max_decoding_message_size = self.max_decoding_message_size;
+                    let max_encoding_message_size = self.max_encoding_message_size;
+                    let inner = self.inner.clone();
+                    let fut = async move {
+                        let method = PublishFramesSvc(inner);
+                        let codec = tonic_prost::ProstCodec::default();
+                        let mut grpc = tonic::server::Grpc::new(codec)
+                            .apply_compression_config(
+                                accept_compression_encodings,
+                                send_compression_encodings,
+                            )
+                            .apply_max_message_size_config(
+                                max_decoding_message_size,
+                                max_encoding_message_size,
+                            );
+                        let res = grpc.streaming(method, req).await;
                         Ok(res)
                     };
                     Box::pin(fut)

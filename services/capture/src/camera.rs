@@ -1,6 +1,7 @@
 //! Task of one camera: commands, state, epochs.
 
 use crate::consent::Leases;
+use crate::push::{Feed, Newest, is_push};
 use crate::reader::Reader;
 use crate::recorder::{Recorder, Recording};
 use crate::source::{OpenSource, open};
@@ -23,6 +24,11 @@ type Answer<T> = oneshot::Sender<Result<T, Status>>;
 /// Command to a camera.
 pub(crate) enum Command {
     Start(Answer<v1::CameraInfo>),
+    /// Runs a camera that a program feeds.
+    Feed {
+        feed: Feed,
+        answer: Answer<v1::CameraInfo>,
+    },
     Stop(Answer<v1::CameraInfo>),
     Calibration(Answer<Calibration>),
     Record {
@@ -33,14 +39,26 @@ pub(crate) enum Command {
 }
 
 /// Access to a camera from the rpcs.
+#[derive(Clone)]
 pub(crate) struct Handle {
     pub(crate) commands: mpsc::Sender<Command>,
     pub(crate) info: watch::Receiver<v1::CameraInfo>,
     pub(crate) leases: Leases,
 }
 
+impl Handle {
+    /// Somebody consents to be seen, or frames are recorded.
+    pub(crate) fn is_watched(&self) -> bool {
+        self.leases.sealer().is_some() || self.info.borrow().recording
+    }
+}
+
 /// Starts the task of a camera; it ends with `ctx.shutdown`.
-pub(crate) fn spawn(config: CameraConfig, key: CameraKey, ctx: Context) -> Handle {
+pub(crate) fn spawn(mut config: CameraConfig, key: CameraKey, ctx: Context) -> Handle {
+    if is_push(&config.source) {
+        // Its frames come at their pace, once.
+        (config.fast, config.looped) = (true, false);
+    }
     let info = v1::CameraInfo {
         store: key.store().into(),
         camera: key.camera().into(),
@@ -82,6 +100,8 @@ struct Run {
     stop: CancellationToken,
     task: tokio::task::JoinHandle<()>,
     calibration: Calibration,
+    /// Frames of the program that feeds it.
+    newest: Option<Arc<Newest>>,
 }
 
 struct Task {
@@ -106,6 +126,7 @@ impl Task {
             // The send fails when the caller has hung up.
             match command {
                 Command::Start(answer) => drop(answer.send(self.start().await)),
+                Command::Feed { feed, answer } => drop(answer.send(self.feed(feed).await)),
                 Command::Stop(answer) => {
                     self.stop().await;
                     let _ = answer.send(Ok(self.info.borrow().clone()));
@@ -134,8 +155,6 @@ impl Task {
             )));
         }
         self.stop().await;
-        let thread = Pool::background("source");
-        let thread = thread.map_err(|e| unavailable("capture", &e.to_string()))?;
         let source = match self.open().await {
             Ok(s) => s,
             Err(why) => {
@@ -147,6 +166,32 @@ impl Task {
                 return Err(unavailable("capture", &why));
             }
         };
+        self.read(source, None).await
+    }
+
+    /// Runs on the frames of a program; the one before it ends.
+    async fn feed(&mut self, feed: Feed) -> Result<v1::CameraInfo, Status> {
+        if !is_push(&self.config.source) {
+            let why = format!("camera `{}` has a source of its own", self.key.camera());
+            return Err(Status::failed_precondition(why));
+        }
+        self.stop().await;
+        let source = match feed.device.as_str() {
+            "" => self.config.source.clone(),
+            device => format!("{}: {device}", self.config.source),
+        };
+        self.info.send_modify(|i| i.source = source);
+        self.read(feed.source, Some(feed.newest)).await
+    }
+
+    /// Reads a source under a new epoch.
+    async fn read(
+        &mut self,
+        source: OpenSource,
+        newest: Option<Arc<Newest>>,
+    ) -> Result<v1::CameraInfo, Status> {
+        let thread = Pool::background("source");
+        let thread = thread.map_err(|e| unavailable("capture", &e.to_string()))?;
         let calibration = source.calibration().clone();
         let publisher = self.ctx.bus.publish(&self.key, &calibration).await;
         let publisher = publisher.map_err(|e| unavailable("capture", &e.to_string()))?;
@@ -178,6 +223,7 @@ impl Task {
             stop,
             task,
             calibration,
+            newest,
         });
         tracing::info!(camera = %self.key, epoch, "running");
         Ok(self.info.borrow().clone())
@@ -185,6 +231,9 @@ impl Task {
 
     async fn stop(&mut self) {
         if let Some(run) = self.run.take() {
+            if let Some(newest) = &run.newest {
+                newest.close();
+            }
             run.stop.cancel();
             let _ = run.task.await;
         }

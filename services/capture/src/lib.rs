@@ -7,6 +7,7 @@
 //!
 //! - Consent: leases and their key [`mod@consent`], their renewal `services/kit/src/consent.rs`.
 //! - Consent to record: [`mod@service`].
+//! - Frames of another program: [`mod@push`].
 //! - Pace of a source: [`mod@pace`].
 #![allow(rustdoc::private_intra_doc_links)] // the index of ideas names private modules
 
@@ -15,6 +16,7 @@ mod check;
 mod consent;
 mod pace;
 mod pattern;
+mod push;
 mod reader;
 mod recorder;
 mod service;
@@ -27,6 +29,9 @@ use std::sync::Arc;
 use tryon_kit::config::Config;
 use tryon_kit::server::{self, Context, Running, Service, StartError};
 use tryon_proto::v1::capture_service_server::{CaptureServiceServer, SERVICE_NAME};
+
+/// Most bytes of a request: a frame of 1024 × 1024 depths with 2048 × 1536 colours or a JPEG.
+const MAX_REQUEST_BYTES: usize = 16 << 20;
 
 /// Starts the service; cameras marked `autostart` begin to publish.
 ///
@@ -45,7 +50,7 @@ pub async fn start(config: &Config, ctx: Context) -> Result<Running, StartError>
     let (mut routes, health) = server::routes(SERVICE_NAME)?;
     routes.add_service(
         CaptureServiceServer::from_arc(capture.clone())
-            .max_decoding_message_size(server::MAX_REQUEST_BYTES),
+            .max_decoding_message_size(MAX_REQUEST_BYTES),
     );
     let service = Service {
         name: "capture",
@@ -59,7 +64,11 @@ pub async fn start(config: &Config, ctx: Context) -> Result<Running, StartError>
     };
     let running = server::start(service, &ctx).await?;
     // After the port is open: consent is renewed while sources are being opened.
-    for camera in c.cameras.iter().filter(|camera| camera.autostart) {
+    for camera in c
+        .cameras
+        .iter()
+        .filter(|camera| camera.autostart && !push::is_push(&camera.source))
+    {
         capture.autostart(&camera.name).await;
     }
     Ok(running)

@@ -1,11 +1,13 @@
 //! The rpcs: find the camera, send it a command, answer.
 
 use crate::camera::{self, Command, Handle};
+use crate::push;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::time::Duration;
 use tokio::sync::oneshot;
-use tonic::{Request, Response, Status};
+use tokio_stream::wrappers::ReceiverStream;
+use tonic::{Request, Response, Status, Streaming};
 use tryon_kit::auth::Grant;
 use tryon_kit::config::CaptureConfig;
 use tryon_kit::frames::CameraKey;
@@ -48,7 +50,10 @@ impl Capture {
 
     /// Camera of that name, if the request's token reaches it. A token for one camera does not learn of others.
     fn find<T>(&self, r: &Request<T>, name: &str) -> Result<&Handle, Status> {
-        let grant = Grant::of(r)?;
+        self.granted(&Grant::of(r)?, name)
+    }
+
+    fn granted(&self, grant: &Grant, name: &str) -> Result<&Handle, Status> {
         let Some((key, handle)) = self.cameras.get(name) else {
             return Err(match grant.camera() {
                 Some(own) if own != name => Status::permission_denied("another camera's token"),
@@ -77,6 +82,26 @@ impl Handle {
 
 #[tonic::async_trait]
 impl CaptureService for Capture {
+    type PublishFramesStream = ReceiverStream<Result<PublishFramesResponse, Status>>;
+
+    async fn publish_frames(
+        &self,
+        r: Request<Streaming<PublishFramesRequest>>,
+    ) -> Result<Response<Self::PublishFramesStream>, Status> {
+        let grant = Grant::of(&r)?;
+        let mut requests = r.into_inner();
+        let described = push::first(&mut requests).await?;
+        let camera = self.granted(&grant, &described.camera)?.clone();
+        let call = push::open(&described)?;
+        let feed = |answer| Command::Feed {
+            feed: call.feed,
+            answer,
+        };
+        camera.send(feed).await?;
+        tokio::spawn(call.sender.run(requests, camera));
+        Ok(Response::new(ReceiverStream::new(call.answers)))
+    }
+
     async fn list_cameras(
         &self,
         r: Request<ListCamerasRequest>,

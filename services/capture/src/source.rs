@@ -1,6 +1,7 @@
-//! Sources of a camera: `synth`, `pattern`, or a recording.
+//! Sources of a camera: `synth`, `pattern`, `push`, or a recording.
 
 use crate::pattern::Pattern;
+use crate::push::is_push;
 use std::path::Path;
 use tryon_formats::{RgbdSource, open_recording};
 use tryon_synth::{Actor, Posture, Routine, Sequence, Setting, SynthSource};
@@ -26,6 +27,10 @@ pub fn open(name: &str) -> Result<OpenSource, SourceError> {
     match kind(name)? {
         SourceKind::Pattern => Ok(Box::new(Pattern::new())),
         SourceKind::Synth(routine) => Ok(synth(routine)),
+        SourceKind::Push => Err(fault(
+            name,
+            "runs while a program feeds it (PublishFrames)".into(),
+        )),
         SourceKind::Recording(path) => recording(name, path),
     }
 }
@@ -37,13 +42,14 @@ pub fn open(name: &str) -> Result<OpenSource, SourceError> {
 pub(crate) fn check(name: &str) -> Result<(), SourceError> {
     match kind(name)? {
         SourceKind::Recording(path) => recording(name, path).map(drop),
-        SourceKind::Pattern | SourceKind::Synth(_) => Ok(()),
+        SourceKind::Pattern | SourceKind::Push | SourceKind::Synth(_) => Ok(()),
     }
 }
 
 /// Kind of a source.
 enum SourceKind<'a> {
     Pattern,
+    Push,
     Synth(Routine),
     Recording(&'a Path),
 }
@@ -58,6 +64,7 @@ fn fault(name: &str, why: String) -> SourceError {
 fn kind(name: &str) -> Result<SourceKind<'_>, SourceError> {
     match name.split_once(':').unwrap_or((name, "")) {
         ("pattern", _) => Ok(SourceKind::Pattern),
+        _ if is_push(name) => Ok(SourceKind::Push),
         ("synth", clip) => {
             let routine = routine(clip).map_err(|why| fault(name, why))?;
             Ok(SourceKind::Synth(routine))
@@ -108,7 +115,7 @@ mod tests {
         let f = s.next_frame().expect("fine").expect("never ends");
         assert_eq!(f.depth.width(), s.calibration().depth.width);
         assert!(
-            ["pattern", "synth", "synth:still"]
+            ["pattern", "push", "synth", "synth:still"]
                 .iter()
                 .all(|s| check(s).is_ok())
         );

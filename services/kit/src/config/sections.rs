@@ -193,7 +193,7 @@ settings! {
     pub struct CameraConfig {
         /// Camera part of the bus keys.
         pub name: String = "front".into(),
-        /// `synth`, `synth:CLIP`, `pattern` (a test picture), or the path of a recording: an RGBD folder or an .mcap file.
+        /// `synth`, `synth:CLIP`, `pattern` (a test picture), `push` (a program feeds it), or the path of a recording.
         pub source: String = "synth".into(),
         /// Frames a second; 0 means the source's own rate.
         pub rate: f64 = 0.0,

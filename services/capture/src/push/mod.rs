@@ -1,0 +1,9 @@
+//! Cameras fed by another program: PublishFrames to a source.
+
+mod description;
+mod feed;
+mod newest;
+mod source;
+
+pub(crate) use feed::{Feed, first, is_push, open};
+pub(crate) use newest::Newest;
