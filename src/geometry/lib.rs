@@ -26,6 +26,7 @@
 //! Camera and files:
 //!
 //! - Projection: [`mod@camera::intrinsics`].
+//! - Lens distortion: [`mod@camera::lens`], inverse [`mod@camera::undistort`]; rectification: [`mod@camera::rectify`].
 //! - Noise of Kinect v1 and time-of-flight: [`mod@camera::noise`].
 //!
 //! Offline cloth:

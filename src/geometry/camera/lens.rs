@@ -66,7 +66,7 @@ impl Distortion {
         *self == Self::default()
     }
 
-    /// Where a ray at `x`, `y` of unit depth is drawn, same units.
+    /// Place at which a ray at `x`, `y` of unit depth is drawn, same units.
     pub fn distort(&self, [x, y]: [f64; 2]) -> [f64; 2] {
         let ([k1, k2, k3, k4, k5, k6], [p1, p2]) = (self.radial, self.tangential);
         let r2 = x * x + y * y;
@@ -84,7 +84,7 @@ impl Distortion {
 pub struct Lens {
     /// The pinhole, pixels.
     pub intrinsics: Intrinsics,
-    /// What the glass adds.
+    /// Distortion of the glass.
     pub distortion: Distortion,
 }
 
