@@ -5,6 +5,7 @@ pub(crate) mod intrinsics;
 pub(crate) mod lens;
 pub(crate) mod noise;
 pub(crate) mod rectify;
+pub(crate) mod register;
 mod resample;
 pub(crate) mod undistort;
 
@@ -16,6 +17,7 @@ pub use noise::{
     time_of_flight_axial_sigma,
 };
 pub use rectify::Rectifier;
+pub use register::Registration;
 
 use crate::math::{Camera, ColorCamera, Rigid};
 use serde::{Deserialize, Serialize};
