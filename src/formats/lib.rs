@@ -8,7 +8,7 @@
 //!
 //! Camera and files:
 //!
-//! - Recordings: [`mod@recording`], [`mod@mcap_file`], [`mod@rgbd_folder`].
+//! - Recordings: [`mod@recording`], [`mod@mcap_file`], [`mod@rgbd_folder`]; rectified: [`mod@rectified`].
 //! - Lossless depth compression: [`mod@image::depth_codec`].
 //! - Motion clips: [`mod@bvh`], [`mod@asf_amc`].
 //! - GlTF, OBJ, MakeHuman: [`mod@gltf`], [`mod@obj`], [`mod@mhclo`].
@@ -41,6 +41,7 @@ mod obj_scene;
 mod position_codec;
 mod private_file;
 mod recording;
+mod rectified;
 mod rgbd_folder;
 mod rgbd_source;
 pub mod scan;

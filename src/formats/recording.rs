@@ -1,10 +1,11 @@
 //! Recordings by their path: an RGBD folder or an MCAP file.
 
+use super::rectified::Rectified;
 use super::rgbd_source::RgbdSource;
 use super::{FormatError, McapReader, RgbdFolder};
 use std::path::{Path, PathBuf};
 
-/// What a recording leaves to its reader.
+/// Choices that a recording leaves to its reader.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct RecordingOptions {
     /// Topic of depth, where a file has several.
@@ -23,14 +24,19 @@ pub fn open_recording(path: &Path) -> Result<Box<dyn RgbdSource>, FormatError> {
     open_recording_with(path, &RecordingOptions::default())
 }
 
-/// As [`open_recording`], with choices.
+/// As [`open_recording`], with choices. Frames of lenses with distortion are rectified.
 ///
 /// # Errors
 /// As [`open_recording`], and a topic that the recording lacks.
 pub fn open_recording_with(
     path: &Path,
-    _options: &RecordingOptions,
+    options: &RecordingOptions,
 ) -> Result<Box<dyn RgbdSource>, FormatError> {
+    Ok(Rectified::wrap(path, open_raw(path, options)?))
+}
+
+/// Opens a recording, lens distortion included.
+fn open_raw(path: &Path, _options: &RecordingOptions) -> Result<Box<dyn RgbdSource>, FormatError> {
     let kind = std::fs::metadata(path).map_err(|e| FormatError::io(path, e))?;
     if kind.is_dir() {
         return Ok(Box::new(RgbdFolder::open(path)?));
