@@ -1,7 +1,7 @@
 //! Registration: depth drawn into the colour view, and colours of depth pixels.
 //!
 //! Each depth pixel draws its footprint, the box around the parallelogram to its neighbours on the same surface, with the
-//! plane of their depths and a z-test. Surfaces have no holes, and no edge of depth is bridged. 2 ms for 640 × 576 into
+//! plane of their depths and a z-test. Surfaces have no holes, and no edge of depth is bridged. 2.3 ms for 640 × 576 into
 //! 1280 × 720 on one thread.
 
 mod footprint;
@@ -90,21 +90,24 @@ impl Registration {
         }
 
         out.resize(self.depth.size());
-        let width = self.depth.width as usize;
+        let width = (self.depth.width as usize).max(1);
         let (pixels, _) = out.data_mut().as_chunks_mut::<3>();
-        for (i, (out, reading)) in pixels.iter_mut().zip(depth.data()).enumerate() {
-            let point = self.projection.pixel([i % width, i / width], *reading);
-            let seen = self.nearest(point, registered);
-            *out = seen.map_or([0; 3], |[u, v]| color.at(u, v));
+        let rows = pixels.chunks_mut(width).zip(depth.data().chunks(width));
+        for (v, (pixels, depth)) in rows.enumerate() {
+            for (u, (out, reading)) in pixels.iter_mut().zip(depth).enumerate() {
+                let point = self.projection.pixel([u, v], *reading);
+                let seen = self.nearest(point, registered);
+                *out = seen.map_or([0; 3], |[x, y]| color.at(x, y));
+            }
         }
         Ok(())
     }
 
     /// Colour pixel nearest to a point of the colour view, if it shows the point.
     fn nearest(&self, [u, v, z]: [f32; 3], registered: Option<&DepthImage>) -> Option<[u32; 2]> {
-        let [x, y] = [u, v].map(|c| (c + 0.5).floor());
-        let is_inside =
-            x >= 0.0 && y >= 0.0 && x < self.color.width as f32 && y < self.color.height as f32;
+        let (x, y) = (u + 0.5, v + 0.5);
+        let (width, height) = (self.color.width as f32, self.color.height as f32);
+        let is_inside = x >= 0.0 && y >= 0.0 && x < width && y < height;
         if z <= 0.0 || !is_inside {
             return None;
         }
@@ -168,6 +171,9 @@ fn draw_rows(registration: &mut Registration, depth: &[u16], out: &mut [u16]) {
             below,
         };
         for first in (0..width).step_by(BLOCK) {
+            if !middle.has_readings(first) {
+                continue;
+            }
             let block = registration.model.block(&rows, first);
             draw_block(&block, registration.color.width as usize, out);
             if block.is_large.contains(&true) {
@@ -180,16 +186,16 @@ fn draw_rows(registration: &mut Registration, depth: &[u16], out: &mut [u16]) {
 }
 
 /// Draws the 2 × 2 colour pixels of each footprint.
+///
+/// One of the four at a time: two next to each other would be stored as one, and the next footprint would wait for it.
 #[inline(always)]
 fn draw_block(block: &FootprintBlock, width: usize, out: &mut [u16]) {
-    let [a, b, c, d] = &block.depth;
-    for k in 0..BLOCK {
-        let offset = block.offset[k] as usize;
-        let (upper, lower) = out[offset..offset + width + 2].split_at_mut(width);
-        upper[0] = upper[0].min(a[k]);
-        upper[1] = upper[1].min(b[k]);
-        lower[0] = lower[0].min(c[k]);
-        lower[1] = lower[1].min(d[k]);
+    for (depth, shift) in block.depth.iter().zip([0, 1, width, width + 1]) {
+        for (offset, depth) in block.offset.iter().zip(depth) {
+            if let Some(nearest) = out.get_mut(*offset as usize + shift) {
+                *nearest = (*nearest).min(*depth);
+            }
+        }
     }
 }
 

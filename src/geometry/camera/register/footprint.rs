@@ -85,26 +85,31 @@ impl FootprintModel {
     /// Footprints of the depth pixels of the middle row from pixel `first` on.
     #[inline(always)]
     pub(super) fn block(&self, rows: &RowWindow<'_>, first: usize) -> FootprintBlock {
-        let [center, left, right] = [1, 0, 2].map(|shift| lanes(rows.middle, first + shift));
-        let [above, below] = [rows.above, rows.below].map(|row| lanes(row, first + 1));
+        let left = Lanes3::new(rows.middle, first);
+        let center = Lanes3::new(rows.middle, first + 1);
+        let right = Lanes3::new(rows.middle, first + 2);
+        let above = Lanes3::new(rows.above, first + 1);
+        let below = Lanes3::new(rows.below, first + 1);
         let mut block = FootprintBlock {
             offset: [0; BLOCK],
             depth: [[EMPTY; BLOCK]; 4],
             is_large: [false; BLOCK],
         };
         for k in 0..BLOCK {
-            let at = |lanes: &[Lanes; 3]| [lanes[0][k], lanes[1][k], lanes[2][k]];
             let footprint = self.of(Neighbourhood {
-                center: at(&center),
-                left: at(&left),
-                right: at(&right),
-                above: at(&above),
-                below: at(&below),
+                center: center.at(k),
+                left: left.at(k),
+                right: right.at(k),
+                above: above.at(k),
+                below: below.at(k),
             });
             let corner = self.corner(&footprint);
             let depth = footprint.depths(corner);
             block.offset[k] = whole(corner[1]) * self.size[0] as u32 + whole(corner[0]);
-            (0..4).for_each(|c| block.depth[c][k] = depth[c]);
+            block.depth[0][k] = depth[0];
+            block.depth[1][k] = depth[1];
+            block.depth[2][k] = depth[2];
+            block.depth[3][k] = depth[3];
             block.is_large[k] =
                 (footprint.end[0] - corner[0] > 2.0) | (footprint.end[1] - corner[1] > 2.0);
         }
@@ -114,23 +119,29 @@ impl FootprintModel {
     /// Upper left pixel of the block of 2 × 2 colour pixels.
     #[inline(always)]
     fn corner(&self, footprint: &Footprint) -> [f32; 2] {
-        std::array::from_fn(|c| footprint.first[c].min(self.size[c] - 2.0))
+        let [x, y] = footprint.first;
+        let within = |at: f32, size: f32| clamp(at, [0.0, size - 2.0]);
+        [within(x, self.size[0]), within(y, self.size[1])]
     }
 
     #[inline(always)]
     fn of(&self, n: Neighbourhood) -> Footprint {
         let across = step([n.left, n.center, n.right], self.steps[0]);
         let down = step([n.above, n.center, n.below], self.steps[1]);
-        let is_reading = n.center[2] > 0.0;
         let half = |c: usize| {
             let parallelogram = 0.5 * (across[c].abs() + down[c].abs());
-            (parallelogram + OVERLAP).min(MAX_HALF)
+            clamp(parallelogram + OVERLAP, [0.0, MAX_HALF])
         };
-        let bound = |c: usize, at: f32| round_up(at).max(0.0).min(self.size[c]);
-        let end = |c: usize| bound(c, n.center[c] + half(c));
+        let bound = |c: usize, at: f32| clamp(round_up(at), [0.0, self.size[c]]);
+        let (x, y) = (half(0), half(1));
+        let [u, v, z] = n.center;
+        // An empty box without reading or beside the image.
+        let first = [bound(0, u - x), bound(1, v - y)];
+        let is_drawn = (z > 0.0) & (first[0] < self.size[0]) & (first[1] < self.size[1]);
+        let end = |c: usize, at: f32| if is_drawn { bound(c, at) } else { 0.0 };
         Footprint {
-            first: [0, 1].map(|c| bound(c, n.center[c] - half(c))),
-            end: [0, 1].map(|c| if is_reading { end(c) } else { 0.0 }),
+            first,
+            end: [end(0, u + x), end(1, v + y)],
             center: n.center,
             slope: slope(across, down),
             range: 0.5 * (across[2].abs() + down[2].abs()),
@@ -142,31 +153,54 @@ impl Footprint {
     /// Depth at a colour pixel [mm].
     #[inline(always)]
     pub(super) fn depth(&self, [x, y]: [f32; 2]) -> u16 {
-        let change = self.slope[0] * (x - self.center[0]) + self.slope[1] * (y - self.center[1]);
-        whole(self.center[2] + change.max(-self.range).min(self.range)) as u16
+        let [u, v, _] = self.center;
+        self.limited(self.slope[0] * (x - u) + self.slope[1] * (y - v))
+    }
+
+    /// Depth of the centre and a change [mm].
+    #[inline(always)]
+    fn limited(&self, change: f32) -> u16 {
+        whole(self.center[2] + clamp(change, [-self.range, self.range])) as u16
     }
 
     /// Depths of the 2 × 2 colour pixels from `corner` on.
     #[inline(always)]
     fn depths(&self, [x, y]: [f32; 2]) -> [u16; 4] {
-        [[x, y], [x + 1.0, y], [x, y + 1.0], [x + 1.0, y + 1.0]].map(|pixel| {
-            let is_inside = (pixel[0] >= self.first[0])
-                & (pixel[0] < self.end[0])
-                & (pixel[1] >= self.first[1])
-                & (pixel[1] < self.end[1]);
-            if is_inside { self.depth(pixel) } else { EMPTY }
-        })
+        let (first, end) = (self.first, self.end);
+        let (left, right) = ((x >= first[0]) & (x < end[0]), x + 1.0 < end[0]);
+        let (upper, lower) = ((y >= first[1]) & (y < end[1]), y + 1.0 < end[1]);
+        let [u, v, _] = self.center;
+        let [by_column, by_row] = self.slope;
+        let change = by_column * (x - u) + by_row * (y - v);
+        let value = |is_inside: bool, change: f32| {
+            let depth = self.limited(change);
+            if is_inside { depth } else { EMPTY }
+        };
+        [
+            value(left & upper, change),
+            value(right & upper, change + by_column),
+            value(left & lower, change + by_row),
+            value(right & lower, change + by_column + by_row),
+        ]
     }
 }
 
-/// Values of a block of pixels of a row.
-#[inline(always)]
-fn lanes(row: &ProjectedRow, first: usize) -> [Lanes; 3] {
-    row.0.each_ref().map(|values| {
-        let mut lanes = [0.0; BLOCK];
-        lanes.copy_from_slice(&values[first..][..BLOCK]);
-        lanes
-    })
+/// Column, row and depth of a block of pixels of a row.
+struct Lanes3<'a>([&'a Lanes; 3]);
+
+impl<'a> Lanes3<'a> {
+    #[inline(always)]
+    fn new(row: &'a ProjectedRow, first: usize) -> Self {
+        let lanes = |values: &'a [f32]| values[first..].first_chunk().unwrap_or(&[0.0; BLOCK]);
+        let [u, v, z] = &row.0;
+        Self([lanes(u), lanes(v), lanes(z)])
+    }
+
+    #[inline(always)]
+    fn at(&self, k: usize) -> Point {
+        let [u, v, z] = self.0;
+        [u[k], v[k], z[k]]
+    }
 }
 
 /// Difference per pixel between the neighbours on the surface of the middle point: central, one-sided, or by default.
@@ -176,16 +210,16 @@ fn step([before, center, after]: [Point; 3], default: [f32; 2]) -> Point {
     let has_before = (before[2] - center[2]).abs() <= tolerance;
     let has_after = (after[2] - center[2]).abs() <= tolerance;
     let scale = if has_before & has_after { 0.5 } else { 1.0 };
-    let default = [default[0], default[1], 0.0];
-    std::array::from_fn(|c| {
+    let change = |c: usize, default: f32| {
         let from = if has_before { before[c] } else { center[c] };
         let to = if has_after { after[c] } else { center[c] };
         if has_before | has_after {
             (to - from) * scale
         } else {
-            default[c]
+            default
         }
-    })
+    };
+    [change(0, default[0]), change(1, default[1]), change(2, 0.0)]
 }
 
 /// Change of depth by colour column and row, from two steps on a surface [mm]; none where it is seen from the side.
@@ -201,6 +235,13 @@ fn slope(across: Point, down: Point) -> [f32; 2] {
         (across[2] * down[1] - down[2] * across[1]) * inverse,
         (across[0] * down[2] - down[0] * across[2]) * inverse,
     ]
+}
+
+/// `x` within limits; the lower one for a NaN. Two instructions, which `f32::clamp` is not.
+#[inline(always)]
+fn clamp(x: f32, [low, high]: [f32; 2]) -> f32 {
+    let x = if x > low { x } else { low };
+    if x < high { x } else { high }
 }
 
 /// Smallest whole number not below `x`, −2²² to 2²²; the same side of a tie for the same `x`.

@@ -40,6 +40,13 @@ impl ProjectedRow {
         Self(std::array::from_fn(|_| vec![0.0; length]))
     }
 
+    /// True if the block of pixels from `first` on has a reading in view.
+    #[inline(always)]
+    pub(super) fn has_readings(&self, first: usize) -> bool {
+        let depths = &self.0[2][1 + first..][..BLOCK];
+        depths.iter().fold(0.0, |sum, z| sum + z) > 0.0
+    }
+
     /// Removes all readings.
     pub(super) fn clear(&mut self) {
         self.0.iter_mut().for_each(|values| values.fill(0.0));
@@ -89,24 +96,30 @@ impl Projection {
         let blocks = self.width.div_ceil(BLOCK);
         let rays = &self.rays[v * blocks..][..blocks];
         let row = &depth[v * self.width..][..self.width];
+        let [out_u, out_v, out_z] = &mut out.0;
         for (i, (rays, depth)) in rays.iter().zip(row.chunks(BLOCK)).enumerate() {
-            let mut readings = [0; BLOCK];
-            readings[..depth.len()].copy_from_slice(depth);
-            let points = self.block(rays, &readings);
-            for (out, points) in out.0.iter_mut().zip(&points) {
-                out[1 + i * BLOCK..][..BLOCK].copy_from_slice(points);
-            }
+            let at = 1 + i * BLOCK..1 + (i + 1) * BLOCK;
+            let [u, v, z] = match depth.first_chunk() {
+                Some(depth) => self.block(rays, depth),
+                None => {
+                    let mut readings = [0; BLOCK];
+                    readings[..depth.len()].copy_from_slice(depth);
+                    self.block(rays, &readings)
+                }
+            };
+            out_u[at.clone()].copy_from_slice(&u);
+            out_v[at.clone()].copy_from_slice(&v);
+            out_z[at].copy_from_slice(&z);
         }
     }
 
     #[inline(always)]
-    fn block(&self, rays: &[Lanes; 3], depth: &[u16; BLOCK]) -> [Lanes; 3] {
-        let mut points = [[0.0; BLOCK]; 3];
+    fn block(&self, [a, b, c]: &[Lanes; 3], depth: &[u16; BLOCK]) -> [Lanes; 3] {
+        let [mut u, mut v, mut z] = [[0.0; BLOCK]; 3];
         for k in 0..BLOCK {
-            let point = self.point(depth[k], [rays[0][k], rays[1][k], rays[2][k]]);
-            (0..3).for_each(|c| points[c][k] = point[c]);
+            [u[k], v[k], z[k]] = self.point(depth[k], [a[k], b[k], c[k]]);
         }
-        points
+        [u, v, z]
     }
 
     /// Column, row and depth in the colour view of depth pixel (`u`, `v`) at `depth` millimetres; zeros without reading or
@@ -125,6 +138,8 @@ impl Projection {
         let v = (depth * ray[1] + origin[1]) * inverse;
         let is_in_range = (depth > 0.0) & (z >= NEAR) & (z <= FAR);
         let is_in_view = (u > -MARGIN) & (v > -MARGIN) & (u < self.limit[0]) & (v < self.limit[1]);
-        [u, v, z].map(|c| if is_in_range & is_in_view { c } else { 0.0 })
+        let is_drawn = is_in_range & is_in_view;
+        let or_none = |c: f32| if is_drawn { c } else { 0.0 };
+        [or_none(u), or_none(v), or_none(z)]
     }
 }
