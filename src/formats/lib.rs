@@ -9,7 +9,7 @@
 //! Camera and files:
 //!
 //! - Recordings: [`mod@recording`], [`mod@mcap_file`], [`mod@rgbd_folder`], [`mod@k4a_file`], [`mod@r3d_file`],
-//!   [`mod@npz_recording`].
+//!   [`mod@npz_recording`]; rectified: [`mod@rectified`].
 //! - Lossless depth compression: [`mod@image::depth_codec`].
 //! - Motion clips: [`mod@bvh`], [`mod@asf_amc`].
 //! - GlTF, OBJ, MakeHuman: [`mod@gltf`], [`mod@obj`], [`mod@mhclo`].
@@ -47,6 +47,7 @@ mod position_codec;
 mod private_file;
 mod r3d_file;
 mod recording;
+mod rectified;
 mod rgbd_folder;
 mod rgbd_source;
 pub mod scan;

@@ -1,5 +1,6 @@
 //! Recordings by their path: an RGBD folder, or a file by its extension.
 
+use super::rectified::Rectified;
 use super::rgbd_source::RgbdSource;
 use super::{FormatError, K4aReader, McapReader, NpzReader, R3dReader, RgbdFolder};
 use std::path::{Path, PathBuf};
@@ -28,7 +29,7 @@ pub fn open_recording(path: &Path) -> Result<Box<dyn RgbdSource>, FormatError> {
     open_recording_with(path, &RecordingOptions::default())
 }
 
-/// As [`open_recording`], with choices.
+/// As [`open_recording`], with choices. Frames of lenses with distortion are rectified.
 ///
 /// # Errors
 /// As [`open_recording`], and a topic that the recording lacks.
@@ -36,6 +37,11 @@ pub fn open_recording_with(
     path: &Path,
     options: &RecordingOptions,
 ) -> Result<Box<dyn RgbdSource>, FormatError> {
+    Ok(Rectified::wrap(path, open_raw(path, options)?))
+}
+
+/// Opens a recording, lens distortion included.
+fn open_raw(path: &Path, _options: &RecordingOptions) -> Result<Box<dyn RgbdSource>, FormatError> {
     let kind = std::fs::metadata(path).map_err(|e| FormatError::io(path, e))?;
     if kind.is_dir() {
         return Ok(Box::new(RgbdFolder::open_with(

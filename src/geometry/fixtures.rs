@@ -1,4 +1,8 @@
-//! Small meshes with closed forms, for tests.
+//! Small meshes and scenes with closed forms, for tests.
+
+mod two_cameras;
+
+pub use two_cameras::{RegistrationScore, TwoCameras};
 
 use crate::math::P3;
 use crate::mesh::Face;

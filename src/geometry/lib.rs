@@ -26,6 +26,8 @@
 //! Camera and files:
 //!
 //! - Projection: [`mod@camera::intrinsics`].
+//! - Lens distortion: [`mod@camera::lens`], inverse [`mod@camera::undistort`]; rectification: [`mod@camera::rectify`].
+//! - Depth in the colour view: [`mod@camera::register`].
 //! - Noise of Kinect v1 and time-of-flight: [`mod@camera::noise`].
 //!
 //! Offline cloth:

@@ -16,6 +16,33 @@ pub struct ImageError {
     pub got: usize,
 }
 
+/// An image that has not the size of its camera.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("{what}: {}×{} pixels, but the camera has {}×{}", got[0], got[1], expected[0], expected[1])]
+pub struct FrameSizeError {
+    /// Kind of image.
+    pub what: &'static str,
+    /// Columns and rows of the image.
+    pub got: [u32; 2],
+    /// Columns and rows of the camera.
+    pub expected: [u32; 2],
+}
+
+impl FrameSizeError {
+    /// Compares columns and rows of an image with those of its camera.
+    pub(super) fn check(what: &'static str, got: [u32; 2], expected: [u32; 2]) -> Result<(), Self> {
+        if got == expected {
+            Ok(())
+        } else {
+            Err(Self {
+                what,
+                got,
+                expected,
+            })
+        }
+    }
+}
+
 fn check(
     what: &'static str,
     width: u32,
@@ -65,6 +92,15 @@ impl DepthImage {
             height,
             data: vec![0; width as usize * height as usize],
         }
+    }
+    /// Changes the size and keeps the memory; the values are then of no meaning unless the size was the same.
+    pub(super) fn resize(&mut self, [width, height]: [u32; 2]) {
+        self.data.resize(width as usize * height as usize, 0);
+        (self.width, self.height) = (width, height);
+    }
+    /// Columns and rows.
+    pub(super) fn size(&self) -> [u32; 2] {
+        [self.width, self.height]
     }
     /// Columns.
     pub fn width(&self) -> u32 {
@@ -119,6 +155,15 @@ impl ColorImage {
             height,
             data: rgb.repeat(width as usize * height as usize),
         }
+    }
+    /// Changes the size and keeps the memory; the values are then of no meaning unless the size was the same.
+    pub(super) fn resize(&mut self, [width, height]: [u32; 2]) {
+        self.data.resize(3 * width as usize * height as usize, 0);
+        (self.width, self.height) = (width, height);
+    }
+    /// Columns and rows.
+    pub(super) fn size(&self) -> [u32; 2] {
+        [self.width, self.height]
     }
     /// Columns.
     pub fn width(&self) -> u32 {

@@ -81,6 +81,10 @@ impl Intrinsics {
         }
         Ok(self)
     }
+    /// Columns and rows.
+    pub(super) fn size(&self) -> [u32; 2] {
+        [self.width, self.height]
+    }
     /// Number of pixels.
     pub fn pixels(&self) -> usize {
         self.width as usize * self.height as usize

@@ -84,7 +84,7 @@ impl Distortion {
 pub struct Lens {
     /// The pinhole, pixels.
     pub intrinsics: Intrinsics,
-    /// Distortion by the glass.
+    /// Distortion of the glass.
     pub distortion: Distortion,
 }
 
