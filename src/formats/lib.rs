@@ -68,6 +68,7 @@ pub use obj_scene::write_obj_scene;
 pub use position_codec::{PositionCoder, STEP as POSITION_STEP};
 pub use r3d_file::R3dReader;
 pub use recording::{RecordingOptions, open_recording, open_recording_with};
+pub use rectified::Rectified;
 pub use rgbd_folder::{RgbdFolder, RgbdFolderWriter, depth_to_mm, read_camera};
 pub use rgbd_source::RgbdSource;
 pub use shared_data::shared_data;

@@ -41,7 +41,7 @@ pub fn open_recording_with(
 }
 
 /// Opens a recording, lens distortion included.
-fn open_raw(path: &Path, _options: &RecordingOptions) -> Result<Box<dyn RgbdSource>, FormatError> {
+fn open_raw(path: &Path, options: &RecordingOptions) -> Result<Box<dyn RgbdSource>, FormatError> {
     let kind = std::fs::metadata(path).map_err(|e| FormatError::io(path, e))?;
     if kind.is_dir() {
         return Ok(Box::new(RgbdFolder::open_with(

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use tryon_geometry::camera::{Calibration, Rectifier, RgbdFrame};
 
 /// Source of rectified frames from one whose frames have lens distortion.
-pub(super) struct Rectified {
+pub struct Rectified {
     path: PathBuf,
     source: Box<dyn RgbdSource>,
     rectifier: Rectifier,
@@ -14,7 +14,7 @@ pub(super) struct Rectified {
 
 impl Rectified {
     /// Wraps `source` if its lenses distort; `path` is named in errors.
-    pub(super) fn wrap(path: &Path, source: Box<dyn RgbdSource>) -> Box<dyn RgbdSource> {
+    pub fn wrap(path: &Path, source: Box<dyn RgbdSource>) -> Box<dyn RgbdSource> {
         let rectifier = Rectifier::new(&source.lenses());
         if rectifier.is_identity() {
             return source;

@@ -597,7 +597,7 @@ pub enum ColorEncoding {
     Bgr8 = 2,
     /// A baseline JPEG of the size of the colour camera.
     Jpeg = 3,
-    /// Two bytes a pixel: Y, U, Y, V of each pair (BT.601, full range, as UVC cameras send).
+    /// Two bytes a pixel: Y, U, Y, V of each pair (BT.601, 16 to 235, as UVC cameras send).
     Yuyv = 4,
 }
 impl ColorEncoding {

@@ -44,8 +44,9 @@ fn frame(number: u64) -> CameraFrame {
         capture_time_ns: 1_000_000_000 + number * 33_333_333,
         depth: (0..pixels)
             .flat_map(|i| (2000 + 2 * i as u16).to_le_bytes())
-            .collect(),
-        color: [10u8, 20, 30].repeat(pixels as usize),
+            .collect::<Vec<u8>>()
+            .into(),
+        color: [10u8, 20, 30].repeat(pixels as usize).into(),
         color_encoding: ColorEncoding::Bgr8.into(),
     }
 }
@@ -166,7 +167,7 @@ async fn the_newest_sender_feeds_and_faults_are_named() {
     assert_eq!(gone.code(), Code::Aborted);
 
     let mut short = frame(2);
-    short.depth.truncate(100);
+    short.depth = short.depth.slice(..100);
     let e = second.send(short).await.expect_err("too short");
     assert_eq!(e.code(), Code::InvalidArgument);
     assert!(e.message().contains("frame.depth"), "{e}");

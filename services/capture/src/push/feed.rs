@@ -5,9 +5,11 @@ use super::newest::{Answers, Newest};
 use super::source::PushSource;
 use crate::camera::Handle;
 use crate::source::OpenSource;
+use std::path::Path;
 use std::sync::Arc;
 use tokio::sync::mpsc;
 use tonic::{Status, Streaming};
+use tryon_formats::Rectified;
 use tryon_proto::convert::WireError;
 use tryon_proto::v1::publish_frames_request::Content;
 use tryon_proto::v1::{
@@ -75,9 +77,10 @@ pub(crate) fn open(described: &CameraDescription) -> Result<Call, WireError> {
     let description = Description::from_wire(described)?;
     let (answers, answered) = mpsc::channel(MAX_ANSWERS);
     let newest = Arc::new(Newest::new(answers.clone()));
-    let source = PushSource::new(&described.camera, description.clone(), newest.clone());
+    let name = Path::new(PUSH).join(&described.camera);
+    let source = PushSource::new(name.clone(), description.clone(), newest.clone());
     let feed = Feed {
-        source: Box::new(source),
+        source: Rectified::wrap(&name, Box::new(source)),
         newest: newest.clone(),
         device: description.device.clone(),
     };

@@ -2,7 +2,7 @@
 
 use super::description::Description;
 use super::newest::Newest;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::Arc;
 use tryon_formats::image::decode_color;
 use tryon_formats::{FormatError, RgbdSource, depth_to_mm};
@@ -21,7 +21,7 @@ pub(super) struct PushSource {
 }
 
 impl PushSource {
-    pub(super) fn new(camera: &str, description: Description, newest: Arc<Newest>) -> Self {
+    pub(super) fn new(name: PathBuf, description: Description, newest: Arc<Newest>) -> Self {
         let lenses = &description.lenses;
         let calibration = Calibration {
             depth: lenses.depth.intrinsics,
@@ -29,7 +29,7 @@ impl PushSource {
             color_from_depth: lenses.color_from_depth,
         };
         Self {
-            name: Path::new("push").join(camera),
+            name,
             description,
             calibration,
             newest,
