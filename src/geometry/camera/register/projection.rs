@@ -136,7 +136,7 @@ impl Projection {
         let inverse = 1.0 / z;
         let u = (depth * ray[0] + origin[0]) * inverse;
         let v = (depth * ray[1] + origin[1]) * inverse;
-        let is_in_range = (depth > 0.0) & (z >= NEAR) & (z <= FAR);
+        let is_in_range = (depth > 0.0) & (NEAR..=FAR).contains(&z);
         let is_in_view = (u > -MARGIN) & (v > -MARGIN) & (u < self.limit[0]) & (v < self.limit[1]);
         let is_drawn = is_in_range & is_in_view;
         let or_none = |c: f32| if is_drawn { c } else { 0.0 };
