@@ -8,7 +8,7 @@
 //!
 //! Camera and files:
 //!
-//! - Recordings: [`mod@recording`], [`mod@mcap_file`], [`mod@rgbd_folder`].
+//! - Recordings: [`mod@recording`], [`mod@mcap_file`], [`mod@rgbd_folder`], [`mod@messages`].
 //! - Lossless depth compression: [`mod@image::depth_codec`].
 //! - Motion clips: [`mod@bvh`], [`mod@asf_amc`].
 //! - GlTF, OBJ, MakeHuman: [`mod@gltf`], [`mod@obj`], [`mod@mhclo`].
@@ -28,6 +28,7 @@ pub mod garmentcode;
 pub mod gltf;
 pub mod image;
 mod mcap_file;
+mod messages;
 pub mod mhclo;
 pub mod morph_target;
 mod motion;
@@ -50,7 +51,7 @@ mod sibling;
 mod texture_points;
 
 pub use error::FormatError;
-pub use mcap_file::{McapReader, McapWriter};
+pub use mcap_file::McapWriter;
 pub use motion::read_motion;
 pub use motion_clip::MotionClip;
 pub use npy_frames::NpyFrames;

@@ -1,7 +1,9 @@
 //! Recordings by their path: an RGBD folder or an MCAP file.
 
+use super::mcap_file::McapMessages;
+use super::messages::{MessageSource, StreamOptions};
 use super::rgbd_source::RgbdSource;
-use super::{FormatError, McapReader, RgbdFolder};
+use super::{FormatError, RgbdFolder};
 use std::path::{Path, PathBuf};
 
 /// What a recording leaves to its reader.
@@ -13,6 +15,17 @@ pub struct RecordingOptions {
     pub color_topic: Option<String>,
     /// A `camera.json` for recordings without a calibration of their own.
     pub camera: Option<PathBuf>,
+}
+
+impl RecordingOptions {
+    /// Choices for recordings of messages.
+    fn streams(&self) -> StreamOptions<'_> {
+        StreamOptions {
+            depth_topic: self.depth_topic.as_deref(),
+            color_topic: self.color_topic.as_deref(),
+            camera: self.camera.as_deref(),
+        }
+    }
 }
 
 /// Opens a recording: an RGBD folder, or a file with the extension `.mcap`.
@@ -29,7 +42,7 @@ pub fn open_recording(path: &Path) -> Result<Box<dyn RgbdSource>, FormatError> {
 /// As [`open_recording`], and a topic that the recording lacks.
 pub fn open_recording_with(
     path: &Path,
-    _options: &RecordingOptions,
+    options: &RecordingOptions,
 ) -> Result<Box<dyn RgbdSource>, FormatError> {
     let kind = std::fs::metadata(path).map_err(|e| FormatError::io(path, e))?;
     if kind.is_dir() {
@@ -39,7 +52,12 @@ pub fn open_recording_with(
         .extension()
         .is_some_and(|e| e.eq_ignore_ascii_case("mcap"))
     {
-        return Ok(Box::new(McapReader::open(path)?));
+        let streams = options.streams();
+        return Ok(Box::new(MessageSource::open(
+            path,
+            McapMessages::open,
+            streams,
+        )?));
     }
     Err(FormatError::field(
         path,

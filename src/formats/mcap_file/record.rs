@@ -10,8 +10,13 @@ use mcap::records::op;
 pub(super) enum McapRecord<'a> {
     /// Schema and its name.
     Schema { id: u16, name: &'a str },
-    /// Channel and its schema.
-    Channel { id: u16, schema: u16 },
+    /// Channel, its schema, topic and message encoding.
+    Channel {
+        id: u16,
+        schema: u16,
+        topic: &'a str,
+        encoding: &'a str,
+    },
     /// Message of a channel.
     Message {
         channel: u16,
@@ -32,14 +37,14 @@ impl<'a> McapRecord<'a> {
         Ok(Some(match opcode {
             op::SCHEMA => {
                 let id = u16::from_le_bytes(take(&mut rest).ok_or("id")?);
-                let length = u32::from_le_bytes(take(&mut rest).ok_or("name")?);
-                let name = rest.get(..length as usize).ok_or("name")?;
-                let name = std::str::from_utf8(name).map_err(|_| "name")?;
+                let name = text(&mut rest).ok_or("name")?;
                 Self::Schema { id, name }
             }
             op::CHANNEL => Self::Channel {
                 id: u16::from_le_bytes(take(&mut rest).ok_or("id")?),
                 schema: u16::from_le_bytes(take(&mut rest).ok_or("schema_id")?),
+                topic: text(&mut rest).ok_or("topic")?,
+                encoding: text(&mut rest).ok_or("message_encoding")?,
             },
             op::MESSAGE => {
                 let channel = u16::from_le_bytes(take(&mut rest).ok_or("channel_id")?);
@@ -63,6 +68,14 @@ fn take<const N: usize>(rest: &mut &[u8]) -> Option<[u8; N]> {
     let (head, tail) = rest.split_first_chunk()?;
     *rest = tail;
     Some(*head)
+}
+
+/// Takes a text with its length off the front.
+fn text<'a>(rest: &mut &'a [u8]) -> Option<&'a str> {
+    let length = u32::from_le_bytes(take(rest)?);
+    let (head, tail) = rest.split_at_checked(length as usize)?;
+    *rest = tail;
+    std::str::from_utf8(head).ok()
 }
 
 #[cfg(test)]
