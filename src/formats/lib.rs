@@ -8,7 +8,8 @@
 //!
 //! Camera and files:
 //!
-//! - Recordings: [`mod@recording`], [`mod@mcap_file`], [`mod@rgbd_folder`], [`mod@messages`].
+//! - Recordings: [`mod@recording`], [`mod@mcap_file`], [`mod@bag_file`],
+//!   [`mod@rosbag2`], [`mod@rgbd_folder`], [`mod@messages`].
 //! - Lossless depth compression: [`mod@image::depth_codec`].
 //! - Motion clips: [`mod@bvh`], [`mod@asf_amc`].
 //! - GlTF, OBJ, MakeHuman: [`mod@gltf`], [`mod@obj`], [`mod@mhclo`].
@@ -20,6 +21,7 @@
 #![allow(rustdoc::private_intra_doc_links)] // the index of ideas names private modules
 
 mod asf_amc;
+mod bag_file;
 mod bvh;
 mod error;
 pub mod fabric_json;
@@ -44,6 +46,7 @@ mod private_file;
 mod recording;
 mod rgbd_folder;
 mod rgbd_source;
+mod rosbag2;
 pub mod scan;
 pub mod sewn_obj;
 mod shared_data;

@@ -1,8 +1,10 @@
-//! Recordings by their path: an RGBD folder or an MCAP file.
+//! Recordings by their path: an RGBD folder, or messages in MCAP, a ROS bag or rosbag2.
 
+use super::bag_file::BagMessages;
 use super::mcap_file::McapMessages;
-use super::messages::{MessageSource, StreamOptions};
+use super::messages::{MessageSource, OpenContainer, StreamOptions};
 use super::rgbd_source::RgbdSource;
+use super::rosbag2::{self, SqliteMessages};
 use super::{FormatError, RgbdFolder};
 use std::path::{Path, PathBuf};
 
@@ -28,7 +30,7 @@ impl RecordingOptions {
     }
 }
 
-/// Opens a recording: an RGBD folder, or a file with the extension `.mcap`.
+/// Opens a recording: an RGBD folder, a rosbag2 folder, or a file ending in `.mcap`, `.bag` or `.db3`.
 ///
 /// # Errors
 /// No such file or folder, neither of both, or an unusable calibration.
@@ -45,23 +47,31 @@ pub fn open_recording_with(
     options: &RecordingOptions,
 ) -> Result<Box<dyn RgbdSource>, FormatError> {
     let kind = std::fs::metadata(path).map_err(|e| FormatError::io(path, e))?;
-    if kind.is_dir() {
+    if kind.is_dir() && !rosbag2::is_folder(path) {
         return Ok(Box::new(RgbdFolder::open(path)?));
     }
-    if path
-        .extension()
-        .is_some_and(|e| e.eq_ignore_ascii_case("mcap"))
-    {
-        let streams = options.streams();
-        return Ok(Box::new(MessageSource::open(
-            path,
-            McapMessages::open,
-            streams,
-        )?));
-    }
-    Err(FormatError::field(
+    let open = container(path, kind.is_dir())?;
+    Ok(Box::new(MessageSource::open(
         path,
-        "recording",
-        "expected a folder with camera.json, or a file ending in .mcap",
-    ))
+        open,
+        options.streams(),
+    )?))
+}
+
+/// Reader of a recording of messages, by the extension of its file.
+fn container(path: &Path, is_folder: bool) -> Result<OpenContainer, FormatError> {
+    if is_folder {
+        return Ok(rosbag2::open_folder);
+    }
+    let extension = path.extension().unwrap_or_default().to_ascii_lowercase();
+    match extension.to_str() {
+        Some("mcap") => Ok(McapMessages::open),
+        Some("bag") => Ok(BagMessages::open),
+        Some("db3") => Ok(SqliteMessages::open),
+        _ => {
+            let why = "expected a folder with camera.json or metadata.yaml, or a file ending in \
+                       .mcap, .bag or .db3";
+            Err(FormatError::field(path, "recording", why))
+        }
+    }
 }

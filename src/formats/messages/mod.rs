@@ -23,7 +23,9 @@ mod transforms;
 mod wire_reader;
 
 #[cfg(test)]
+mod recorded_tests;
+#[cfg(test)]
 mod report_tests;
 
 pub(crate) use container::{Channel, MAX_RECORD, MessageContainer, MessageHead};
-pub(crate) use source::{MessageSource, StreamOptions};
+pub(crate) use source::{MessageSource, OpenContainer, StreamOptions};
