@@ -8,7 +8,7 @@ use super::rosbag2::{self, SqliteMessages};
 use super::{FormatError, RgbdFolder};
 use std::path::{Path, PathBuf};
 
-/// What a recording leaves to its reader.
+/// Choices that a recording leaves to its reader.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct RecordingOptions {
     /// Topic of depth, where a file has several.

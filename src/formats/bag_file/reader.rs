@@ -3,7 +3,7 @@
 use super::chunk::ChunkRecords;
 use super::record::{RecordFault, RecordHeader, field, op, read_data, skip_data};
 use crate::FormatError;
-use crate::messages::{Channel, MAX_RECORD, MessageContainer, MessageHead};
+use crate::messages::{MAX_RECORD, MessageContainer, MessageHead, TopicChannel};
 use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::{BufReader, Read, Seek, SeekFrom};
@@ -27,7 +27,7 @@ pub(crate) struct BagMessages {
     /// Position of the next record of the file.
     next: u64,
     chunk: Option<ChunkRecords>,
-    channels: BTreeMap<u32, Arc<Channel>>,
+    channels: BTreeMap<u32, Arc<TopicChannel>>,
     buffer: Vec<u8>,
     messages: u64,
     is_ended: bool,
@@ -77,7 +77,7 @@ impl BagMessages {
 
     fn step(
         &mut self,
-        is_wanted: &dyn Fn(&Channel) -> bool,
+        is_wanted: &dyn Fn(&TopicChannel) -> bool,
         data: &mut Vec<u8>,
     ) -> Result<BagStep, RecordFault> {
         let Some(mut chunk) = self.chunk.take() else {
@@ -104,7 +104,7 @@ impl BagMessages {
     /// Reads a record of the file itself; chunks are opened, indices skipped.
     fn file_record(
         &mut self,
-        is_wanted: &dyn Fn(&Channel) -> bool,
+        is_wanted: &dyn Fn(&TopicChannel) -> bool,
         data: &mut Vec<u8>,
     ) -> Result<BagStep, RecordFault> {
         if self.next > self.length {
@@ -139,7 +139,7 @@ impl BagMessages {
         &mut self,
         header: &RecordHeader,
         from: &mut dyn Read,
-        is_wanted: &dyn Fn(&Channel) -> bool,
+        is_wanted: &dyn Fn(&TopicChannel) -> bool,
         data: &mut Vec<u8>,
     ) -> Result<BagStep, RecordFault> {
         let length = header.data_length;
@@ -174,7 +174,7 @@ impl BagMessages {
         let id = u32::from_le_bytes(header.number("conn")?);
         let topic = String::from_utf8_lossy(header.field("topic")?);
         let schema = String::from_utf8_lossy(field(&self.buffer, "type")?);
-        let channel = Channel::new(&topic, &schema, "ros1");
+        let channel = TopicChannel::new(&topic, &schema, "ros1");
         if self.channels.get(&id).is_none_or(|c| **c != channel) {
             self.channels.insert(id, Arc::new(channel));
         }
@@ -212,7 +212,7 @@ fn halves(bytes: [u8; 8]) -> [u64; 2] {
 impl MessageContainer for BagMessages {
     fn next_message(
         &mut self,
-        is_wanted: &dyn Fn(&Channel) -> bool,
+        is_wanted: &dyn Fn(&TopicChannel) -> bool,
         data: &mut Vec<u8>,
     ) -> Result<Option<MessageHead>, FormatError> {
         while !self.is_ended {
@@ -225,7 +225,7 @@ impl MessageContainer for BagMessages {
         }
         Ok(None)
     }
-    fn channels(&self) -> Vec<Arc<Channel>> {
+    fn channels(&self) -> Vec<Arc<TopicChannel>> {
         self.channels.values().cloned().collect()
     }
     fn is_cut_short(&self) -> bool {

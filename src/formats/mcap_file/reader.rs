@@ -2,7 +2,7 @@
 
 use super::record::McapRecord;
 use crate::FormatError;
-use crate::messages::{Channel, MAX_RECORD, MessageContainer, MessageHead};
+use crate::messages::{MAX_RECORD, MessageContainer, MessageHead, TopicChannel};
 use mcap::McapError;
 use mcap::sans_io::linear_reader::{LinearReadEvent, LinearReader, LinearReaderOptions};
 use std::collections::BTreeMap;
@@ -21,7 +21,7 @@ pub(crate) struct McapMessages {
     records: LinearReader,
     /// Names of schemas by number.
     schemas: BTreeMap<u16, String>,
-    channels: BTreeMap<u16, Arc<Channel>>,
+    channels: BTreeMap<u16, Arc<TopicChannel>>,
     messages: u64,
     is_ended: bool,
     is_cut_short: bool,
@@ -64,7 +64,7 @@ impl McapMessages {
 
     fn add_channel(&mut self, id: u16, schema: u16, topic: &str, encoding: &str) {
         let schema = self.schemas.get(&schema).map_or("", String::as_str);
-        let channel = Channel::new(topic, schema, encoding);
+        let channel = TopicChannel::new(topic, schema, encoding);
         // The summary repeats channels.
         if self.channels.get(&id).is_none_or(|c| **c != channel) {
             self.channels.insert(id, Arc::new(channel));
@@ -75,7 +75,7 @@ impl McapMessages {
 impl MessageContainer for McapMessages {
     fn next_message(
         &mut self,
-        is_wanted: &dyn Fn(&Channel) -> bool,
+        is_wanted: &dyn Fn(&TopicChannel) -> bool,
         data: &mut Vec<u8>,
     ) -> Result<Option<MessageHead>, FormatError> {
         while !self.is_ended {
@@ -137,7 +137,7 @@ impl MessageContainer for McapMessages {
         self.is_ended = true;
         Ok(None)
     }
-    fn channels(&self) -> Vec<Arc<Channel>> {
+    fn channels(&self) -> Vec<Arc<TopicChannel>> {
         self.channels.values().cloned().collect()
     }
     fn is_cut_short(&self) -> bool {

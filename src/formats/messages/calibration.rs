@@ -18,7 +18,7 @@ pub(super) struct StreamCalibration {
     pub(super) lenses: LensCalibration,
     /// Metres of a unit of 16-bit depth.
     pub(super) depth_unit: f64,
-    /// What is left out or assumed.
+    /// Notes on what is left out or assumed.
     pub(super) notes: Vec<String>,
 }
 

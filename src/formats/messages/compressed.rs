@@ -1,7 +1,7 @@
 //! Compressed images: JPEG and PNG of `compressed_image_transport` and Foxglove, `compressed_depth_image_transport`.
 
 use super::fault::MessageFault;
-use super::image_message::{PixelContent, millimetres};
+use super::image_layout::{PixelContent, millimetres};
 use crate::image::{decode_color, decode_png_depth};
 use crate::rgbd_folder::depth_to_mm;
 use std::path::Path;

@@ -1,13 +1,10 @@
 //! Content of messages by schema and encoding: images, cameras, transforms, depth units.
 
-use super::camera_info::CameraInfo;
-use super::container::Channel;
 use super::fault::MessageFault;
 use super::foxglove_messages::{self, FoxgloveKind};
-use super::image_message::ImageMessage;
+use super::message_item::MessageItem;
 use super::realsense;
 use super::ros_messages::{self, RosKind};
-use super::transforms::FrameEdge;
 use super::wire_reader::RosWire;
 
 /// Schema and encoding of messages that have a part in RGBD frames.
@@ -40,28 +37,18 @@ impl MessageKind {
     }
 }
 
-/// Content of a message.
-#[derive(Clone, Debug)]
-pub(super) enum MessageItem<'a> {
-    Image(ImageMessage<'a>),
-    Camera(CameraInfo),
-    Transforms(Vec<FrameEdge>),
-    /// Metres of a unit of 16-bit depth.
-    DepthUnit(f64),
-}
-
-/// Decodes a message; `None` for kinds of no interest. Pixels stay encoded.
+/// Decodes a message of a topic. Pixels stay encoded.
 ///
 /// # Errors
 /// A field that is cut short or no text.
 pub(super) fn decode_message<'a>(
-    channel: &Channel,
+    kind: MessageKind,
+    topic: &str,
     data: &'a [u8],
-) -> Result<Option<MessageItem<'a>>, MessageFault> {
-    let item = match channel.kind {
-        None => return Ok(None),
-        Some(MessageKind::Foxglove(kind)) => foxglove_messages::decode(kind, data)?,
-        Some(MessageKind::Ros(wire, kind)) => ros_messages::decode(wire, kind, data)?,
+) -> Result<MessageItem<'a>, MessageFault> {
+    let item = match kind {
+        MessageKind::Foxglove(kind) => foxglove_messages::decode(kind, data)?,
+        MessageKind::Ros(wire, kind) => ros_messages::decode(wire, kind, data)?,
     };
-    Ok(Some(realsense::with_stream_frames(&channel.topic, item)))
+    Ok(realsense::with_stream_frames(topic, item))
 }

@@ -1,8 +1,6 @@
 //! Fault of a message: the field and the reason, before file and topic are known.
 
-use super::container::MessageHead;
 use crate::FormatError;
-use std::path::Path;
 
 /// Unusable field of a message.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -19,16 +17,6 @@ impl MessageFault {
             field: field.into(),
             why: why.into(),
         }
-    }
-
-    /// Adds file, topic, schema and number of the message.
-    pub(super) fn at(self, path: &Path, head: &MessageHead) -> FormatError {
-        let (number, channel) = (head.number, &head.channel);
-        let field = format!(
-            "message {number}, {} ({}).{}",
-            channel.topic, channel.schema, self.field
-        );
-        FormatError::field(path, field, self.why)
     }
 }
 

@@ -1,9 +1,10 @@
 //! Foxglove's protobuf messages of images, cameras and transforms.
 
 use super::camera_info::CameraInfo;
-use super::decode::MessageItem;
 use super::fault::MessageFault;
-use super::image_message::{ImageLayout, ImageMessage};
+use super::image_layout::ImageLayout;
+use super::image_message::ImageMessage;
+use super::message_item::MessageItem;
 use super::transforms::{FrameEdge, pose};
 use crate::foxglove::{
     CameraCalibration, CompressedImage, FoxgloveMessage, FrameTransform, FrameTransforms, RawImage,

@@ -10,7 +10,9 @@ mod container;
 mod decode;
 mod fault;
 mod foxglove_messages;
+mod image_layout;
 mod image_message;
+mod message_item;
 mod pairing;
 mod raw_pixels;
 mod realsense;
@@ -27,5 +29,5 @@ mod recorded_tests;
 #[cfg(test)]
 mod report_tests;
 
-pub(crate) use container::{Channel, MAX_RECORD, MessageContainer, MessageHead};
+pub(crate) use container::{MAX_RECORD, MessageContainer, MessageHead, TopicChannel};
 pub(crate) use source::{MessageSource, OpenContainer, StreamOptions};

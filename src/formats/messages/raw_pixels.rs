@@ -1,7 +1,7 @@
 //! Pixel formats of raw images, by the names of `sensor_msgs/image_encodings`.
 
 use super::fault::MessageFault;
-use super::image_message::{ImageLayout, PixelContent, millimetres};
+use super::image_layout::{ImageLayout, PixelContent, millimetres};
 use crate::image::check_size;
 use crate::rgbd_folder::depth_to_mm;
 use std::path::Path;

@@ -3,7 +3,7 @@
 //! Its headers name no frames of reference: a stream's prefix stands for its frame, and `PREFIX/tf/GROUP` holds the
 //! transform from the group's reference stream to the stream (librealsense, `ros_file_format.h`).
 
-use super::decode::MessageItem;
+use super::message_item::MessageItem;
 
 /// Endings of topics, with the messages that they hold.
 const OPTION: &str = "/option/Depth_Units/value";

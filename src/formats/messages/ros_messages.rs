@@ -1,9 +1,10 @@
 //! ROS messages of images, cameras and transforms (`sensor_msgs`, `tf2_msgs`, `geometry_msgs`), ROS 1 and ROS 2.
 
 use super::camera_info::CameraInfo;
-use super::decode::MessageItem;
 use super::fault::MessageFault;
-use super::image_message::{ImageLayout, ImageMessage};
+use super::image_layout::ImageLayout;
+use super::image_message::ImageMessage;
+use super::message_item::MessageItem;
 use super::transforms::{FrameEdge, pose};
 use super::wire_reader::{RosWire, WireReader};
 

@@ -1,8 +1,8 @@
 //! Choice of the depth and the colour topic of a recording, and an account of the others.
 
-use super::container::Channel;
+use super::container::TopicChannel;
 use super::fault::MessageFault;
-use super::image_message::PixelContent;
+use super::image_layout::PixelContent;
 use super::survey::{ImageTopic, Survey};
 use std::sync::Arc;
 
@@ -120,10 +120,14 @@ impl Survey {
         match candidates[..] {
             [one] => Ok(one),
             [] => {
-                let why = format!(
+                let mut why = format!(
                     "no depth image (16UC1, 32FC1, compressedDepth or mono16); image topics: {}",
                     self.listed(|_| true)
                 );
+                for note in unread_channels(&self.channels) {
+                    why.push_str("; ");
+                    why.push_str(&note);
+                }
                 Err(MessageFault::new("depth topic", why))
             }
             _ => Err(ambiguous("depth", &candidates)),
@@ -201,26 +205,32 @@ fn reason(topic: &ImageTopic, selection: &Selection<'_>) -> String {
     }
 }
 
-/// Account of channels without a part in RGBD frames, by encoding and schema: one line each.
-pub(super) fn other_channels(channels: &[Arc<Channel>]) -> Vec<String> {
-    let mut notes = Vec::new();
-    let of_images = |c: &Channel| {
-        ["Image", "CameraCalibration", "CameraInfo", "DepthImage"]
-            .iter()
-            .any(|n| c.schema.trim_end_matches('_').ends_with(n))
-    };
-    let (images, others): (Vec<_>, Vec<_>) = channels
+/// Account of channels of images and cameras in an encoding that is not read.
+fn unread_channels(channels: &[Arc<TopicChannel>]) -> Vec<String> {
+    let unread = channels
         .iter()
-        .filter(|c| c.kind.is_none())
-        .partition(|c| of_images(c));
-    for c in images {
-        let (topic, schema, encoding) = (&c.topic, &c.schema, &c.encoding);
-        notes.push(format!(
-            "`{topic}`: {schema} in the encoding `{encoding}` is not read"
-        ));
-    }
+        .filter(|c| c.kind.is_none() && is_of_images(c));
+    unread
+        .map(|c| {
+            let (topic, schema, encoding) = (&c.topic, &c.schema, &c.encoding);
+            format!("`{topic}`: {schema} in the encoding `{encoding}` is not read")
+        })
+        .collect()
+}
+
+fn is_of_images(channel: &TopicChannel) -> bool {
+    let schema = channel.schema.trim_end_matches('_');
+    let ends = ["Image", "CameraCalibration", "CameraInfo"];
+    ends.iter().any(|end| schema.ends_with(end))
+}
+
+/// Account of channels without a part in RGBD frames: one line for each of images, one for all others.
+pub(super) fn other_channels(channels: &[Arc<TopicChannel>]) -> Vec<String> {
+    let mut notes = unread_channels(channels);
+    let others = channels
+        .iter()
+        .filter(|c| c.kind.is_none() && !is_of_images(c));
     let mut names: Vec<String> = others
-        .iter()
         .map(|c| format!("`{}` ({})", c.topic, c.schema))
         .collect();
     names.sort();
@@ -324,9 +334,13 @@ mod tests {
 
     #[test]
     fn other_topics_are_named_once() {
-        let mut channels = vec![Arc::new(Channel::new("/c", "foxglove.RawImage", "json"))];
+        let mut channels = vec![Arc::new(TopicChannel::new(
+            "/c",
+            "foxglove.RawImage",
+            "json",
+        ))];
         for i in 0..20 {
-            let c = Channel::new(&format!("/imu{i}"), "sensor_msgs/msg/Imu", "cdr");
+            let c = TopicChannel::new(&format!("/imu{i}"), "sensor_msgs/msg/Imu", "cdr");
             channels.push(Arc::new(c));
         }
         let notes = other_channels(&channels);

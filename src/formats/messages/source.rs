@@ -2,7 +2,7 @@
 
 use super::container::MessageContainer;
 use super::fault::MessageFault;
-use super::pairing::NearestItem;
+use super::pairing::{MAX_GAP_NS, NearestItem};
 use super::selection::{TopicWish, other_channels};
 use super::survey::Survey;
 use super::topic_images::{TimeBase, TimedImage, TopicImages};
@@ -17,7 +17,7 @@ use tryon_geometry::camera::{
 /// Opens a container at its start.
 pub(crate) type OpenContainer = fn(&Path) -> Result<Box<dyn MessageContainer>, FormatError>;
 
-/// What a recording leaves to its reader.
+/// Choices that a recording leaves to its reader.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct StreamOptions<'a> {
     /// Topic of depth, where a file has several.
@@ -56,6 +56,14 @@ pub(crate) struct MessageSource {
     behind_ns: Option<u64>,
     color: Option<TopicImages>,
     nearest: NearestItem<TimedImage>,
+    counts: FrameCounts,
+}
+
+/// Frames of a reading so far.
+#[derive(Clone, Copy, Debug, Default)]
+struct FrameCounts {
+    all: u64,
+    without_color: u64,
 }
 
 impl std::fmt::Debug for MessageSource {
@@ -114,6 +122,7 @@ impl MessageSource {
             ahead: None,
             behind_ns: None,
             nearest: NearestItem::new(),
+            counts: FrameCounts::default(),
         })
     }
 
@@ -202,7 +211,7 @@ impl MessageSource {
         let Some(paired) = self.nearest.pair(time_ns, neighbours, next)? else {
             return Ok(None);
         };
-        let fault = |f: MessageFault| f.at(&self.path, &paired.head);
+        let fault = |f: MessageFault| paired.head.error(&self.path, f);
         let color = paired.image.color().map_err(fault)?;
         let camera = self.calibration.color.unwrap_or(self.calibration.depth);
         check_camera("color size", (color.width(), color.height()), &camera).map_err(fault)?;
@@ -210,25 +219,32 @@ impl MessageSource {
     }
 
     fn depth_of(&self, depth: &TimedImage) -> Result<DepthImage, FormatError> {
-        let fault = |f: MessageFault| f.at(&self.path, &depth.head);
+        let fault = |f: MessageFault| depth.head.error(&self.path, f);
         let image = depth.image.depth(self.streams.depth_unit).map_err(fault)?;
         let size = (image.width(), image.height());
         check_camera("depth size", size, &self.calibration.depth).map_err(fault)?;
         Ok(image)
     }
 
-    /// Notes topics that begin late, and a file that is cut short.
+    /// Notes topics that begin late, frames without colour, and a file that is cut short.
     fn note_the_end(&mut self) {
         let container = self.depth.container();
         let mut notes = other_channels(&container.channels());
         let known = |c: &str| self.notes.iter().any(|n| n.contains(&format!("`{c}`")));
         for c in container.channels() {
-            let is_image = c.kind.is_some_and(|k| k.is_image());
+            let is_image = c.has_images();
             let is_chosen = c.topic == self.streams.depth
                 || self.streams.color.as_ref().is_some_and(|t| *t == c.topic);
             if is_image && !is_chosen && !known(&c.topic) {
                 notes.push(format!("`{}`: begins late, not taken", c.topic));
             }
+        }
+        let FrameCounts { all, without_color } = self.counts;
+        if let Some(color) = self.streams.color.as_ref().filter(|_| without_color > 0) {
+            let gap = MAX_GAP_NS as f64 * 1e-6;
+            notes.push(format!(
+                "`{color}`: {without_color} of {all} frames have no colour within {gap:.1} ms"
+            ));
         }
         if container.is_cut_short() {
             notes.push("the file is cut short: frames end at its last whole message".into());
@@ -269,6 +285,8 @@ impl RgbdSource for MessageSource {
             return Ok(None);
         };
         let color = self.color_at(depth.time_ns, next_ns)?;
+        self.counts.all += 1;
+        self.counts.without_color += u64::from(color.is_none());
         let sequence = depth.image.sequence.unwrap_or(depth.head.sequence);
         Ok(Some(RgbdFrame {
             sequence: sequence.into(),
@@ -289,7 +307,7 @@ impl RgbdSource for MessageSource {
         );
         (self.depth, self.color) = (depth, color);
         (self.ahead, self.behind_ns) = (None, None);
-        self.nearest = NearestItem::new();
+        (self.nearest, self.counts) = (NearestItem::new(), FrameCounts::default());
         self.notes.truncate(self.opening_notes);
         Ok(())
     }

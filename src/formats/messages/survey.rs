@@ -1,9 +1,10 @@
 //! Topics, cameras and transforms of a recording's start.
 
 use super::camera_info::CameraInfo;
-use super::container::{Channel, MessageContainer, MessageHead};
-use super::decode::{MessageItem, decode_message};
-use super::image_message::{ImageMessage, PixelContent};
+use super::container::{MessageContainer, MessageHead, TopicChannel};
+use super::image_layout::PixelContent;
+use super::image_message::ImageMessage;
+use super::message_item::MessageItem;
 use super::transforms::FrameGraph;
 use crate::FormatError;
 use std::collections::BTreeMap;
@@ -68,7 +69,7 @@ pub(super) struct Survey {
     /// Option topics of depth units, and the unit \[m\].
     pub(super) depth_units: Vec<(String, f64)>,
     /// Channels met.
-    pub(super) channels: Vec<Arc<Channel>>,
+    pub(super) channels: Vec<Arc<TopicChannel>>,
     /// First message at fault.
     pub(super) fault: Option<FormatError>,
 }
@@ -90,11 +91,11 @@ impl Survey {
                 Err(_) if !survey.images.is_empty() => break,
                 Err(e) => return Err(e),
             };
-            match decode_message(&head.channel, &data) {
+            match head.channel.decode(&data) {
                 Ok(Some(item)) => survey.insert(&head, item),
                 Ok(None) => {}
                 Err(fault) => {
-                    survey.fault.get_or_insert_with(|| fault.at(path, &head));
+                    survey.fault.get_or_insert_with(|| head.error(path, fault));
                 }
             }
             if survey.images.values().any(|t| t.images >= LOOK_AHEAD) {

@@ -1,8 +1,8 @@
 //! Images of one topic, in file order, by time.
 
-use super::container::{Channel, MessageContainer, MessageHead};
-use super::decode::{MessageItem, decode_message};
+use super::container::{MessageContainer, MessageHead, TopicChannel};
 use super::image_message::ImageMessage;
+use super::message_item::MessageItem;
 use crate::FormatError;
 use std::path::PathBuf;
 
@@ -66,12 +66,12 @@ impl TopicImages {
     pub(super) fn next_image(&mut self) -> Result<Option<TimedImage>, FormatError> {
         while !self.is_ended {
             let topic = &self.topic;
-            let is_wanted = |c: &Channel| c.topic == *topic && c.kind.is_some_and(|k| k.is_image());
+            let is_wanted = |c: &TopicChannel| c.topic == *topic && c.has_images();
             let read = self.container.next_message(&is_wanted, &mut self.buffer);
             self.is_ended = !matches!(read, Ok(Some(_)));
             let Some(head) = read? else { break };
-            let decoded = decode_message(&head.channel, &self.buffer);
-            let item = decoded.map_err(|fault| fault.at(&self.path, &head))?;
+            let decoded = head.channel.decode(&self.buffer);
+            let item = decoded.map_err(|fault| head.error(&self.path, fault))?;
             if let Some(MessageItem::Image(image)) = item {
                 let time_ns = match self.times {
                     TimeBase::Stamp => image.stamp_ns.unwrap_or(head.log_time_ns),

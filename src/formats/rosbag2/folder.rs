@@ -4,7 +4,7 @@ use super::reader::SqliteMessages;
 use crate::FormatError;
 use crate::image::read_limited;
 use crate::mcap_file::McapMessages;
-use crate::messages::{Channel, MessageContainer, MessageHead};
+use crate::messages::{MessageContainer, MessageHead, TopicChannel};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -64,7 +64,7 @@ struct SplitMessages {
     files: Vec<PathBuf>,
     current: Option<Box<dyn MessageContainer>>,
     /// Channels of earlier files.
-    passed: Vec<Arc<Channel>>,
+    passed: Vec<Arc<TopicChannel>>,
     /// Messages of earlier files.
     messages_passed: u64,
     /// Number of the last message.
@@ -104,7 +104,7 @@ impl SplitMessages {
 impl MessageContainer for SplitMessages {
     fn next_message(
         &mut self,
-        is_wanted: &dyn Fn(&Channel) -> bool,
+        is_wanted: &dyn Fn(&TopicChannel) -> bool,
         data: &mut Vec<u8>,
     ) -> Result<Option<MessageHead>, FormatError> {
         while let Some(current) = &mut self.current {
@@ -124,7 +124,7 @@ impl MessageContainer for SplitMessages {
         }
         Ok(None)
     }
-    fn channels(&self) -> Vec<Arc<Channel>> {
+    fn channels(&self) -> Vec<Arc<TopicChannel>> {
         let current = self.current.iter().flat_map(|c| c.channels());
         self.passed.iter().cloned().chain(current).collect()
     }

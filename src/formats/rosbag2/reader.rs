@@ -4,7 +4,7 @@ use super::sqlite_pages::SqlitePages;
 use super::sqlite_row::{RowFault, column};
 use super::sqlite_table::{RowPlace, TableRows, read_overflow};
 use crate::FormatError;
-use crate::messages::{Channel, MAX_RECORD, MessageContainer, MessageHead};
+use crate::messages::{MAX_RECORD, MessageContainer, MessageHead, TopicChannel};
 use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::ErrorKind;
@@ -21,7 +21,7 @@ pub(crate) struct SqliteMessages {
     rows: TableRows,
     columns: MessageColumns,
     /// Channels by topic.
-    channels: BTreeMap<i64, Arc<Channel>>,
+    channels: BTreeMap<i64, Arc<TopicChannel>>,
     messages: u64,
     is_ended: bool,
     is_cut_short: bool,
@@ -91,14 +91,14 @@ fn all_rows(
 }
 
 /// Channels of the table `topics`.
-fn topics(pages: &mut SqlitePages) -> Result<BTreeMap<i64, Arc<Channel>>, RowFault> {
+fn topics(pages: &mut SqlitePages) -> Result<BTreeMap<i64, Arc<TopicChannel>>, RowFault> {
     let table = table(pages, "topics")?;
     let [name, kind, format] = ["name", "type", "serialization_format"].map(|c| table.column(c));
     let (name, kind, format) = (name?, kind?, format?);
     let mut channels = BTreeMap::new();
     all_rows(pages, table.root, |id, record| {
         let text = |i| column(record, i).and_then(|c| c.text()).unwrap_or("");
-        let channel = Channel::new(text(name), text(kind), text(format));
+        let channel = TopicChannel::new(text(name), text(kind), text(format));
         channels.insert(id, Arc::new(channel));
     })?;
     Ok(channels)
@@ -165,7 +165,7 @@ impl SqliteMessages {
     fn message(
         &mut self,
         place: &RowPlace,
-        is_wanted: &dyn Fn(&Channel) -> bool,
+        is_wanted: &dyn Fn(&TopicChannel) -> bool,
         record: &mut Vec<u8>,
     ) -> Result<Option<MessageHead>, RowFault> {
         let integer = |record: &[u8], i| column(record, i).and_then(|c| c.integer());
@@ -196,7 +196,7 @@ impl SqliteMessages {
 impl MessageContainer for SqliteMessages {
     fn next_message(
         &mut self,
-        is_wanted: &dyn Fn(&Channel) -> bool,
+        is_wanted: &dyn Fn(&TopicChannel) -> bool,
         data: &mut Vec<u8>,
     ) -> Result<Option<MessageHead>, FormatError> {
         while !self.is_ended {
@@ -228,7 +228,7 @@ impl MessageContainer for SqliteMessages {
         }
         Ok(None)
     }
-    fn channels(&self) -> Vec<Arc<Channel>> {
+    fn channels(&self) -> Vec<Arc<TopicChannel>> {
         self.channels.values().cloned().collect()
     }
     fn is_cut_short(&self) -> bool {

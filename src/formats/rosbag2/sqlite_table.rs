@@ -13,7 +13,7 @@ const LEAF: u8 = 13;
 #[derive(Debug)]
 struct TreeLevel {
     page: Vec<u8>,
-    /// Where its header begins: after the file's on page one.
+    /// Start of its header: after the file's on page one.
     header: usize,
     is_leaf: bool,
     cells: usize,
