@@ -23,6 +23,7 @@
 mod asf_amc;
 mod bag_file;
 mod bvh;
+mod chunk_records;
 mod error;
 pub mod fabric_json;
 mod foxglove;

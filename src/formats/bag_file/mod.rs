@@ -1,6 +1,5 @@
 //! ROS 1 bags, format 2.0 (<http://wiki.ros.org/Bags/Format/2.0>): chunks stored, or compressed by bz2 or lz4.
 
-mod chunk;
 mod reader;
 mod record;
 

@@ -1,8 +1,8 @@
 //! Messages of a bag as a stream: chunk after chunk, each with a decompressor of its own.
 
-use super::chunk::ChunkRecords;
-use super::record::{RecordFault, RecordHeader, field, op, read_data, skip_data};
+use super::record::{RecordFault, RecordHeader, field, op, read_data};
 use crate::FormatError;
+use crate::chunk_records::{ChunkCompression, ChunkRecords, skip_bytes};
 use crate::messages::{MAX_RECORD, MessageContainer, MessageHead, TopicChannel};
 use std::collections::BTreeMap;
 use std::fs::File;
@@ -131,7 +131,17 @@ impl BagMessages {
         file.seek(SeekFrom::Start(start))?;
         let bytes = BufReader::with_capacity(BUFFER, file).take(header.data_length);
         let size = u32::from_le_bytes(header.number("size")?);
-        ChunkRecords::new(header.field("compression")?, size, bytes)
+        let compression = match header.field("compression")? {
+            b"none" => ChunkCompression::Stored,
+            b"bz2" => ChunkCompression::Bz2,
+            b"lz4" => ChunkCompression::Lz4,
+            other => {
+                let name = String::from_utf8_lossy(other);
+                let why = format!("`{name}`, expected none, bz2 or lz4");
+                return Err(RecordFault::Field("compression", why));
+            }
+        };
+        Ok(ChunkRecords::new(compression, size.into(), bytes)?)
     }
 
     /// Reads the data of a connection or a message; skips those of other records.
@@ -162,9 +172,9 @@ impl BagMessages {
                         number: self.messages,
                     }));
                 }
-                skip_data(from, length)?;
+                skip_bytes(from, length)?;
             }
-            _ => skip_data(from, length)?,
+            _ => skip_bytes(from, length)?,
         }
         Ok(BagStep::Other)
     }

@@ -1,5 +1,6 @@
 //! Records of a bag: a header of named fields, then data.
 
+use crate::chunk_records::read_bytes;
 use std::io::{self, Read};
 
 /// Largest header, bytes: fields hold a topic's name at most.
@@ -108,10 +109,10 @@ pub(super) fn field<'a>(mut fields: &'a [u8], name: &'static str) -> Result<&'a 
     Err(RecordFault::Field(name, "missing".into()))
 }
 
-/// Reads `length` bytes into `data`; its memory grows with the bytes there are, not with the length.
+/// Reads data of `length` bytes, at most `limit`.
 ///
 /// # Errors
-/// Fewer bytes, or a length above `limit`.
+/// Fewer bytes, or a greater length.
 pub(super) fn read_data(
     from: &mut dyn Read,
     length: u64,
@@ -122,24 +123,7 @@ pub(super) fn read_data(
         let why = format!("{length} bytes, expected at most {limit}");
         return Err(RecordFault::Field("data length", why));
     }
-    data.clear();
-    let read = from.take(length).read_to_end(data)?;
-    if (read as u64) < length {
-        return Err(RecordFault::CutShort);
-    }
-    Ok(())
-}
-
-/// Skips `length` bytes.
-///
-/// # Errors
-/// Fewer bytes.
-pub(super) fn skip_data(from: &mut dyn Read, length: u64) -> Result<(), RecordFault> {
-    let skipped = io::copy(&mut from.take(length), &mut io::sink())?;
-    if skipped < length {
-        return Err(RecordFault::CutShort);
-    }
-    Ok(())
+    Ok(read_bytes(from, length, data)?)
 }
 
 #[cfg(test)]

@@ -4,6 +4,7 @@
 //! `/camera/calibration` (CameraCalibration, once for each camera), `/tf` (FrameTransform, when colour has its own
 //! camera). Log time is capture time. Each frame is a chunk of its own: a truncated file keeps all whole frames.
 
+mod chunk;
 mod reader;
 mod record;
 mod writer;

@@ -1,74 +1,257 @@
-//! Messages of an MCAP file as a stream.
+//! Messages of an MCAP file as a stream: chunk after chunk, each with a decompressor of its own.
 
-use super::record::McapRecord;
+use super::chunk::{self, McapFault};
+use super::record::{MESSAGE_HEADER, McapRecord};
 use crate::FormatError;
+use crate::chunk_records::{ChunkRecords, read_bytes, skip_bytes};
 use crate::messages::{MAX_RECORD, MessageContainer, MessageHead, TopicChannel};
-use mcap::McapError;
-use mcap::sans_io::linear_reader::{LinearReadEvent, LinearReader, LinearReaderOptions};
+use mcap::records::op;
 use std::collections::BTreeMap;
 use std::fs::File;
-use std::io::Read;
+use std::io::{BufReader, ErrorKind, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 /// Bytes read at a time.
 const BUFFER: usize = 1 << 16;
 
-/// MCAP file, read record by record.
+/// MCAP file, read record by record up to its summary. Its index is not used, so files without one are read too.
 pub(crate) struct McapMessages {
     path: PathBuf,
-    file: File,
-    records: LinearReader,
+    /// Shares its position with the chunk being read, and seeks after it.
+    file: BufReader<File>,
+    /// Bytes of the file.
+    length: u64,
+    /// Position of the next record of the file.
+    next: u64,
+    chunk: Option<ChunkRecords>,
     /// Names of schemas by number.
     schemas: BTreeMap<u16, String>,
     channels: BTreeMap<u16, Arc<TopicChannel>>,
+    buffer: Vec<u8>,
     messages: u64,
     is_ended: bool,
     is_cut_short: bool,
+}
+
+/// Step of reading.
+enum McapStep {
+    /// Message of a wanted channel.
+    Message(MessageHead),
+    /// Another record, or the end of a chunk.
+    Other,
+    /// End of the messages.
+    End,
+}
+
+/// Code and length of a record.
+#[derive(Clone, Copy, Debug)]
+struct RecordPrefix {
+    opcode: u8,
+    /// Bytes of its content.
+    length: u64,
+}
+
+impl RecordPrefix {
+    /// Reads a prefix; `None` at the end.
+    fn read(from: &mut dyn Read) -> Result<Option<Self>, McapFault> {
+        let mut bytes = [0; 9];
+        if from.read(&mut bytes[..1])? == 0 {
+            return Ok(None);
+        }
+        from.read_exact(&mut bytes[1..])?;
+        let [opcode, length @ ..] = bytes;
+        Ok(Some(Self {
+            opcode,
+            length: u64::from_le_bytes(length),
+        }))
+    }
+    fn field(self, part: &str) -> String {
+        format!("record 0x{:02x}.{part}", self.opcode)
+    }
 }
 
 impl McapMessages {
     /// Opens a file at its start.
     ///
     /// # Errors
-    /// Those of the system.
+    /// Those of the system, or another magic.
     pub(crate) fn open(path: &Path) -> Result<Box<dyn MessageContainer>, FormatError> {
-        let file = File::open(path).map_err(|e| FormatError::io(path, e))?;
-        // A greater length is refused before anything is allocated.
-        let options = LinearReaderOptions::default()
-            .with_record_length_limit(MAX_RECORD)
-            .with_validate_chunk_crcs(true);
+        let io = |e| FormatError::io(path, e);
+        let file = File::open(path).map_err(io)?;
+        let length = file.metadata().map_err(io)?.len();
+        let mut file = BufReader::with_capacity(BUFFER, file);
+        let mut magic = Vec::new();
+        let mut first = (&mut file).take(mcap::MAGIC.len() as u64);
+        first.read_to_end(&mut magic).map_err(io)?;
+        if magic != mcap::MAGIC {
+            let why = "expected that of MCAP, version 0";
+            return Err(FormatError::field(path, "magic", why));
+        }
         Ok(Box::new(Self {
             path: path.to_owned(),
             file,
-            records: LinearReader::new_with_options(options),
+            length,
+            next: mcap::MAGIC.len() as u64,
+            chunk: None,
             schemas: BTreeMap::new(),
             channels: BTreeMap::new(),
+            buffer: Vec::new(),
             messages: 0,
             is_ended: false,
             is_cut_short: false,
         }))
     }
 
-    /// Ends the stream: silently where the file does after its first message, else with an error.
-    fn end(&mut self, error: McapError) -> Result<(), FormatError> {
-        self.is_ended = true;
-        let is_cut = matches!(error, McapError::UnexpectedEof | McapError::UnexpectedEoc);
-        if is_cut && self.messages > 0 {
-            self.is_cut_short = true;
-            return Ok(());
-        }
-        let field = format!("after message {}", self.messages);
-        Err(FormatError::field(&self.path, field, error.to_string()))
+    fn step(
+        &mut self,
+        is_wanted: &dyn Fn(&TopicChannel) -> bool,
+        data: &mut Vec<u8>,
+    ) -> Result<McapStep, McapFault> {
+        let Some(mut chunk) = self.chunk.take() else {
+            return self.file_record(is_wanted, data);
+        };
+        let step = match RecordPrefix::read(&mut chunk) {
+            Ok(None) => {
+                self.file.seek(SeekFrom::Start(self.next))?;
+                return Ok(McapStep::Other);
+            }
+            Ok(Some(prefix)) => self.record(prefix, &mut chunk, is_wanted, data),
+            Err(fault) => Err(fault),
+        };
+        // Also after a fault: it lies in the chunk.
+        self.chunk = Some(chunk);
+        step
     }
 
-    fn add_channel(&mut self, id: u16, schema: u16, topic: &str, encoding: &str) {
-        let schema = self.schemas.get(&schema).map_or("", String::as_str);
-        let channel = TopicChannel::new(topic, schema, encoding);
-        // The summary repeats channels.
-        if self.channels.get(&id).is_none_or(|c| **c != channel) {
-            self.channels.insert(id, Arc::new(channel));
+    /// Reads a record of the file itself; chunks are opened, indices and attachments skipped.
+    fn file_record(
+        &mut self,
+        is_wanted: &dyn Fn(&TopicChannel) -> bool,
+        data: &mut Vec<u8>,
+    ) -> Result<McapStep, McapFault> {
+        let end = || McapFault::Io(ErrorKind::UnexpectedEof.into());
+        let prefix = RecordPrefix::read(&mut self.file)?.ok_or_else(end)?;
+        let start = self.file.stream_position()?;
+        self.next = start.saturating_add(prefix.length);
+        match prefix.opcode {
+            op::DATA_END | op::FOOTER => return Ok(McapStep::End),
+            op::CHUNK => {
+                let mut file = self.file.get_ref().try_clone()?;
+                file.seek(SeekFrom::Start(start))?;
+                let bytes = BufReader::with_capacity(BUFFER, file).take(prefix.length);
+                self.chunk = Some(chunk::records(bytes, prefix.length)?);
+                return Ok(McapStep::Other);
+            }
+            op::SCHEMA | op::CHANNEL | op::MESSAGE => {}
+            _ if self.next > self.length => return Err(end()),
+            _ => {
+                self.file.seek(SeekFrom::Start(self.next))?;
+                return Ok(McapStep::Other);
+            }
         }
+        let mut from = self.file.get_ref().try_clone()?;
+        from.seek(SeekFrom::Start(start))?;
+        let step = self.record(prefix, &mut from, is_wanted, data)?;
+        self.file.seek(SeekFrom::Start(self.next))?;
+        Ok(step)
+    }
+
+    /// Reads the content of a schema, a channel or a message; skips others.
+    fn record(
+        &mut self,
+        prefix: RecordPrefix,
+        from: &mut dyn Read,
+        is_wanted: &dyn Fn(&TopicChannel) -> bool,
+        data: &mut Vec<u8>,
+    ) -> Result<McapStep, McapFault> {
+        let RecordPrefix { opcode, length } = prefix;
+        if !matches!(opcode, op::SCHEMA | op::CHANNEL | op::MESSAGE) {
+            skip_bytes(from, length)?;
+            return Ok(McapStep::Other);
+        }
+        if length > MAX_RECORD as u64 {
+            let why = format!("{length} bytes, which exceeds limit of {MAX_RECORD}");
+            return Err(McapFault::field(prefix.field("length"), why));
+        }
+        let header = match opcode {
+            op::MESSAGE => length.min(MESSAGE_HEADER),
+            _ => length,
+        };
+        let mut buffer = std::mem::take(&mut self.buffer);
+        read_bytes(from, header, &mut buffer)?;
+        let parsed = McapRecord::parse(opcode, &buffer);
+        let record =
+            parsed.map_err(|part| McapFault::field(prefix.field(part), "cut short, or no text"))?;
+        let head = record.and_then(|record| self.take_record(record));
+        self.buffer = buffer;
+        match head.filter(|head| is_wanted(&head.channel)) {
+            Some(head) => {
+                read_bytes(from, length - header, data)?;
+                Ok(McapStep::Message(head))
+            }
+            None => {
+                skip_bytes(from, length - header)?;
+                Ok(McapStep::Other)
+            }
+        }
+    }
+
+    /// Keeps schemas and channels; the head of a message whose channel is known.
+    fn take_record(&mut self, record: McapRecord<'_>) -> Option<MessageHead> {
+        match record {
+            McapRecord::Schema { id, name } => {
+                self.schemas.insert(id, name.to_owned());
+                None
+            }
+            McapRecord::Channel {
+                id,
+                schema,
+                topic,
+                encoding,
+            } => {
+                let schema = self.schemas.get(&schema).map_or("", String::as_str);
+                let channel = TopicChannel::new(topic, schema, encoding);
+                self.channels.insert(id, Arc::new(channel));
+                None
+            }
+            McapRecord::Message {
+                channel,
+                sequence,
+                log_time,
+            } => {
+                self.messages += 1;
+                Some(MessageHead {
+                    channel: self.channels.get(&channel)?.clone(),
+                    sequence,
+                    log_time_ns: log_time,
+                    number: self.messages,
+                })
+            }
+        }
+    }
+
+    /// Ends the stream: silently where the file does after its first message, else with an error.
+    fn end(&mut self, fault: McapFault) -> Result<(), FormatError> {
+        self.is_ended = true;
+        let is_past_the_end = self.chunk.is_none() || self.next > self.length;
+        let (field, why) = match fault {
+            McapFault::Field(field, why) => (field, why),
+            McapFault::Io(e) if e.kind() != ErrorKind::UnexpectedEof => {
+                ("chunk".into(), format!("damaged ({e})"))
+            }
+            McapFault::Io(_) if !is_past_the_end => {
+                let why = "damaged: fewer bytes than it states";
+                ("chunk".into(), why.into())
+            }
+            McapFault::Io(_) if self.messages > 0 => {
+                self.is_cut_short = true;
+                return Ok(());
+            }
+            McapFault::Io(_) => ("record".into(), "the file is cut short".into()),
+        };
+        let field = format!("after message {}, {field}", self.messages);
+        Err(FormatError::field(&self.path, field, why))
     }
 }
 
@@ -79,62 +262,13 @@ impl MessageContainer for McapMessages {
         data: &mut Vec<u8>,
     ) -> Result<Option<MessageHead>, FormatError> {
         while !self.is_ended {
-            let (opcode, content) = match self.records.next_event() {
-                None => break,
-                Some(Ok(LinearReadEvent::ReadRequest(n))) => {
-                    // At most a buffer at a time: a wrong length costs no more memory than the file holds.
-                    let want = self.records.insert(n.min(BUFFER));
-                    let got = self.file.read(want);
-                    let got = got.map_err(|e| FormatError::io(&self.path, e))?;
-                    self.records.notify_read(got);
-                    continue;
-                }
-                Some(Ok(LinearReadEvent::Record { opcode, data })) => (opcode, data),
-                Some(Err(e)) => {
-                    self.end(e)?;
-                    break;
-                }
-            };
-            let record = McapRecord::parse(opcode, content).map_err(|part| {
-                let field = format!("record 0x{opcode:02x}.{part}");
-                FormatError::field(&self.path, field, "cut short, or no text")
-            });
-            match record.inspect_err(|_| self.is_ended = true)? {
-                Some(McapRecord::Schema { id, name }) => {
-                    self.schemas.insert(id, name.to_owned());
-                }
-                Some(McapRecord::Channel {
-                    id,
-                    schema,
-                    topic,
-                    encoding,
-                }) => {
-                    let (topic, encoding) = (topic.to_owned(), encoding.to_owned());
-                    self.add_channel(id, schema, &topic, &encoding);
-                }
-                Some(McapRecord::Message {
-                    channel,
-                    sequence,
-                    log_time,
-                    data: content,
-                }) => {
-                    self.messages += 1;
-                    let channel = self.channels.get(&channel);
-                    if let Some(channel) = channel.filter(|c| is_wanted(c)) {
-                        data.clear();
-                        data.extend_from_slice(content);
-                        return Ok(Some(MessageHead {
-                            channel: channel.clone(),
-                            sequence,
-                            log_time_ns: log_time,
-                            number: self.messages,
-                        }));
-                    }
-                }
-                None => {}
+            match self.step(is_wanted, data) {
+                Ok(McapStep::Message(head)) => return Ok(Some(head)),
+                Ok(McapStep::Other) => {}
+                Ok(McapStep::End) => self.is_ended = true,
+                Err(fault) => self.end(fault)?,
             }
         }
-        self.is_ended = true;
         Ok(None)
     }
     fn channels(&self) -> Vec<Arc<TopicChannel>> {

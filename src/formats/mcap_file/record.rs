@@ -1,9 +1,13 @@
 //! Records of an MCAP file that lead to messages, <https://mcap.dev/spec>.
 //!
 //! Read here rather than by the `mcap` crate: its parser allocates the length that a string states before it looks
-//! whether the record has that many bytes, and slices short attachments out of range.
+//! whether the record has that many bytes, its reader the length of a record in a chunk, and a record that leads out of
+//! its chunk overflows a subtraction.
 
 use mcap::records::op;
+
+/// Bytes of a message's record before its data.
+pub(super) const MESSAGE_HEADER: u64 = 22;
 
 /// Record on the way to a message.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -17,13 +21,12 @@ pub(super) enum McapRecord<'a> {
         topic: &'a str,
         encoding: &'a str,
     },
-    /// Message of a channel.
+    /// Header of a channel's message; data follow.
     Message {
         channel: u16,
         sequence: u32,
         /// Nanoseconds.
         log_time: u64,
-        data: &'a [u8],
     },
 }
 
@@ -46,32 +49,25 @@ impl<'a> McapRecord<'a> {
                 topic: text(&mut rest).ok_or("topic")?,
                 encoding: text(&mut rest).ok_or("message_encoding")?,
             },
-            op::MESSAGE => {
-                let channel = u16::from_le_bytes(take(&mut rest).ok_or("channel_id")?);
-                let sequence = u32::from_le_bytes(take(&mut rest).ok_or("sequence")?);
-                let log_time = u64::from_le_bytes(take(&mut rest).ok_or("log_time")?);
-                let _publish_time: [u8; 8] = take(&mut rest).ok_or("publish_time")?;
-                Self::Message {
-                    channel,
-                    sequence,
-                    log_time,
-                    data: rest,
-                }
-            }
+            op::MESSAGE => Self::Message {
+                channel: u16::from_le_bytes(take(&mut rest).ok_or("channel_id")?),
+                sequence: u32::from_le_bytes(take(&mut rest).ok_or("sequence")?),
+                log_time: u64::from_le_bytes(take(&mut rest).ok_or("log_time")?),
+            },
             _ => return Ok(None),
         }))
     }
 }
 
 /// Takes `N` bytes off the front.
-fn take<const N: usize>(rest: &mut &[u8]) -> Option<[u8; N]> {
+pub(super) fn take<const N: usize>(rest: &mut &[u8]) -> Option<[u8; N]> {
     let (head, tail) = rest.split_first_chunk()?;
     *rest = tail;
     Some(*head)
 }
 
 /// Takes a text with its length off the front.
-fn text<'a>(rest: &mut &'a [u8]) -> Option<&'a str> {
+pub(super) fn text<'a>(rest: &mut &'a [u8]) -> Option<&'a str> {
     let length = u32::from_le_bytes(take(rest)?);
     let (head, tail) = rest.split_at_checked(length as usize)?;
     *rest = tail;
