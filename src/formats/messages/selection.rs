@@ -9,6 +9,10 @@ use std::sync::Arc;
 /// Names of topics that one line of the account holds.
 const MOST_NAMES: usize = 12;
 
+/// Kinds of pixels that are depth, and that are colour.
+const DEPTH: [PixelContent; 2] = [PixelContent::Depth, PixelContent::Grey16];
+const COLOR: [PixelContent; 2] = [PixelContent::Color, PixelContent::Grey];
+
 /// Topics wished for.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct TopicWish<'a> {
@@ -62,11 +66,11 @@ impl Survey {
     /// A wished topic that is missing or not read, no depth, or several topics of which none is distinguished.
     pub(super) fn select(&self, wish: TopicWish<'_>) -> Result<Selection<'_>, MessageFault> {
         let depth = match wish.depth {
-            Some(name) => self.named(name, "depth topic")?,
+            Some(name) => self.named(name, "depth topic", DEPTH)?,
             None => self.only_depth()?,
         };
         let color = match wish.color {
-            Some(name) => Some(self.named(name, "color topic")?),
+            Some(name) => Some(self.named(name, "color topic", COLOR)?),
             None => self.nearest_color(depth)?,
         };
         let mut selection = Selection {
@@ -82,38 +86,49 @@ impl Survey {
         Ok(selection)
     }
 
-    fn named(&self, name: &str, field: &str) -> Result<&ImageTopic, MessageFault> {
-        self.images.get(name).ok_or_else(|| {
-            let why = format!(
-                "no images under `{name}`; topics: {}",
-                self.listed(|_| true)
-            );
+    /// The topic of a name, whose pixels are of one of these kinds.
+    fn named(
+        &self,
+        name: &str,
+        field: &str,
+        contents: [PixelContent; 2],
+    ) -> Result<&ImageTopic, MessageFault> {
+        let fault = |start: String| {
+            let why = format!("{start}; image topics: {}", self.listed());
             MessageFault::new(field, why)
-        })
+        };
+        match self.images.get(name) {
+            None => Err(fault(format!("no images under `{name}`"))),
+            Some(t) if !contents.contains(&t.content) => Err(fault(format!("not {t}"))),
+            Some(topic) => Ok(topic),
+        }
     }
 
-    /// Image topics that `is_meant` holds for, or a word that there are none.
-    fn listed(&self, is_meant: impl Fn(&ImageTopic) -> bool) -> String {
-        let meant = self.images.values().filter(|t| is_meant(t));
-        let names: Vec<String> = meant.map(ToString::to_string).collect();
+    /// Image topics, or a word that there are none.
+    fn listed(&self) -> String {
+        let names: Vec<String> = self.images.values().map(ToString::to_string).collect();
         match names.is_empty() {
-            true => "none with images".into(),
+            true => "none".into(),
             false => names.join(", "),
         }
     }
 
-    fn only_depth(&self) -> Result<&ImageTopic, MessageFault> {
-        let of = |content| {
+    /// Topics of the first of these kinds that has any, without infrared and repetitions.
+    fn candidates(&self, contents: [PixelContent; 2]) -> Vec<&ImageTopic> {
+        let of = |content: PixelContent| {
             let topics = self.images.values();
-            let all: Vec<_> = topics
-                .filter(|t| t.content == content && !is_named_infrared(&t.topic))
-                .collect();
-            without_twins(all)
+            let is_meant = |t: &&ImageTopic| t.content == content && !is_named_infrared(&t.topic);
+            without_twins(topics.filter(is_meant).collect())
         };
-        let mut candidates = of(PixelContent::Depth);
-        if candidates.is_empty() {
-            candidates = of(PixelContent::Grey16);
-        }
+        let found = contents.map(of);
+        found
+            .into_iter()
+            .find(|c| !c.is_empty())
+            .unwrap_or_default()
+    }
+
+    fn only_depth(&self) -> Result<&ImageTopic, MessageFault> {
+        let mut candidates = self.candidates(DEPTH);
         if candidates.len() > 1 && candidates.iter().any(|t| is_named_depth(&t.topic)) {
             candidates.retain(|t| is_named_depth(&t.topic));
         }
@@ -122,7 +137,7 @@ impl Survey {
             [] => {
                 let mut why = format!(
                     "no depth image (16UC1, 32FC1, compressedDepth or mono16); image topics: {}",
-                    self.listed(|_| true)
+                    self.listed()
                 );
                 for note in unread_channels(&self.channels) {
                     why.push_str("; ");
@@ -136,17 +151,7 @@ impl Survey {
 
     /// The colour topic that shares most of its path with the depth topic; grey only without colour.
     fn nearest_color(&self, depth: &ImageTopic) -> Result<Option<&ImageTopic>, MessageFault> {
-        let of = |content| {
-            let topics = self.images.values();
-            let all: Vec<_> = topics
-                .filter(|t| t.content == content && !is_named_infrared(&t.topic))
-                .collect();
-            without_twins(all)
-        };
-        let mut candidates = of(PixelContent::Color);
-        if candidates.is_empty() {
-            candidates = of(PixelContent::Grey);
-        }
+        let mut candidates = self.candidates(COLOR);
         let keys = candidates
             .iter()
             .map(|t| shared_segments(&t.topic, &depth.topic));
@@ -330,6 +335,15 @@ mod tests {
             color: None,
         };
         assert!(survey.select(wish).is_err_and(|e| e.why.contains("`/x`")));
+        let wish = TopicWish {
+            depth: Some("/c"),
+            color: None,
+        };
+        assert!(
+            survey
+                .select(wish)
+                .is_err_and(|e| e.why.starts_with("not `/c`"))
+        );
     }
 
     #[test]

@@ -38,6 +38,27 @@ struct ChosenStreams {
     depth_unit: f64,
 }
 
+impl ChosenStreams {
+    /// Readers of depth and of colour, each at the start of the file.
+    fn readers(
+        &self,
+        path: &Path,
+        open: OpenContainer,
+    ) -> Result<(TopicImages, Option<TopicImages>), FormatError> {
+        let images = |topic: &str| {
+            let container = open(path)?;
+            Ok::<_, FormatError>(TopicImages::new(
+                path.to_owned(),
+                container,
+                topic,
+                self.times,
+            ))
+        };
+        let color = self.color.as_deref().map(images).transpose()?;
+        Ok((images(&self.depth)?, color))
+    }
+}
+
 /// Recording of messages, read frame by frame with memory for two depth and three colour messages. A truncated file
 /// ends at its last whole message.
 pub(crate) struct MessageSource {
@@ -64,6 +85,18 @@ pub(crate) struct MessageSource {
 struct FrameCounts {
     all: u64,
     without_color: u64,
+    /// Sequence number of the last one.
+    sequence: Option<u64>,
+}
+
+impl FrameCounts {
+    /// Sequence number of the next frame: the one stated, or the next where writers leave it constant.
+    fn number(&mut self, stated: u32) -> u64 {
+        let least = self.sequence.map_or(0, |last| last + 1);
+        let sequence = u64::from(stated).max(least);
+        self.sequence = Some(sequence);
+        sequence
+    }
 }
 
 impl std::fmt::Debug for MessageSource {
@@ -86,30 +119,17 @@ impl MessageSource {
         options: StreamOptions<'_>,
     ) -> Result<Self, FormatError> {
         let survey = Survey::read(path, &mut *open(path)?)?;
-        let mut survey_fault = None;
-        let found = Self::choose(path, &survey, options);
-        if found.is_err() {
-            survey_fault = survey.fault;
-        }
-        let (streams, lenses, notes) = match (found, survey_fault) {
-            (Ok(found), _) => found,
-            (Err(_), Some(first)) => return Err(first),
-            (Err(e), None) => return Err(e),
+        let (streams, lenses, notes) = match Self::choose(path, &survey, options) {
+            Ok(found) => found,
+            // A message at fault is the likelier reason for what is missing.
+            Err(e) => return Err(survey.fault.unwrap_or(e)),
         };
-        let images = |topic: &str| {
-            let container = open(path)?;
-            Ok(TopicImages::new(
-                path.to_owned(),
-                container,
-                topic,
-                streams.times,
-            ))
-        };
+        let (depth, color) = streams.readers(path, open)?;
         Ok(Self {
             path: path.to_owned(),
             open,
-            depth: images(&streams.depth)?,
-            color: streams.color.as_deref().map(images).transpose()?,
+            depth,
+            color,
             calibration: Calibration {
                 depth: lenses.depth.intrinsics,
                 color: lenses.color.map(|c| c.intrinsics),
@@ -239,7 +259,9 @@ impl MessageSource {
                 notes.push(format!("`{}`: begins late, not taken", c.topic));
             }
         }
-        let FrameCounts { all, without_color } = self.counts;
+        let FrameCounts {
+            all, without_color, ..
+        } = self.counts;
         if let Some(color) = self.streams.color.as_ref().filter(|_| without_color > 0) {
             let gap = MAX_GAP_NS as f64 * 1e-6;
             notes.push(format!(
@@ -287,25 +309,16 @@ impl RgbdSource for MessageSource {
         let color = self.color_at(depth.time_ns, next_ns)?;
         self.counts.all += 1;
         self.counts.without_color += u64::from(color.is_none());
-        let sequence = depth.image.sequence.unwrap_or(depth.head.sequence);
+        let stated = depth.image.sequence.unwrap_or(depth.head.sequence);
         Ok(Some(RgbdFrame {
-            sequence: sequence.into(),
+            sequence: self.counts.number(stated),
             time_ns: depth.time_ns,
             depth: self.depth_of(&depth)?,
             color,
         }))
     }
     fn rewind(&mut self) -> Result<(), FormatError> {
-        let images = |topic: &str| {
-            let container = (self.open)(&self.path)?;
-            let path = self.path.clone();
-            Ok::<_, FormatError>(TopicImages::new(path, container, topic, self.streams.times))
-        };
-        let (depth, color) = (
-            images(&self.streams.depth)?,
-            self.streams.color.as_deref().map(images).transpose()?,
-        );
-        (self.depth, self.color) = (depth, color);
+        (self.depth, self.color) = self.streams.readers(&self.path, self.open)?;
         (self.ahead, self.behind_ns) = (None, None);
         (self.nearest, self.counts) = (NearestItem::new(), FrameCounts::default());
         self.notes.truncate(self.opening_notes);
