@@ -4,6 +4,14 @@ use bzip2::read::BzDecoder;
 use flate2::Crc;
 use std::io::{self, BufRead, Read};
 
+/// Most bytes read at a time.
+const BUFFER: u64 = 1 << 16;
+
+/// Buffer of a reader of `length` bytes: small files need no more than they have.
+pub(super) fn buffer_size(length: u64) -> usize {
+    length.min(BUFFER) as usize
+}
+
 /// Compression of a chunk.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum ChunkCompression {

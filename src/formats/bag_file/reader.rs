@@ -2,7 +2,7 @@
 
 use super::record::{RecordFault, RecordHeader, field, op, read_data};
 use crate::FormatError;
-use crate::chunk_records::{ChunkCompression, ChunkRecords, skip_bytes};
+use crate::chunk_records::{ChunkCompression, ChunkRecords, buffer_size, skip_bytes};
 use crate::messages::{MAX_RECORD, MessageContainer, MessageHead, TopicChannel};
 use std::collections::BTreeMap;
 use std::fs::File;
@@ -14,9 +14,6 @@ use std::sync::Arc;
 const MAGIC: &[u8] = b"#ROSBAG V2.0\n";
 /// Largest connection record, bytes: message definitions have some kilobytes.
 const MAX_CONNECTION: usize = 4 << 20;
-/// Bytes read at a time.
-const BUFFER: usize = 1 << 16;
-
 /// ROS 1 bag, read record by record. Its index is not used, so unindexed bags are read too.
 pub(crate) struct BagMessages {
     path: PathBuf,
@@ -53,7 +50,7 @@ impl BagMessages {
         let io = |e| FormatError::io(path, e);
         let file = File::open(path).map_err(io)?;
         let length = file.metadata().map_err(io)?.len();
-        let mut file = BufReader::with_capacity(BUFFER, file);
+        let mut file = BufReader::with_capacity(buffer_size(length), file);
         let mut magic = Vec::new();
         let first = (&mut file).take(MAGIC.len() as u64).read_to_end(&mut magic);
         first.map_err(io)?;
@@ -129,7 +126,8 @@ impl BagMessages {
     fn open_chunk(&self, header: &RecordHeader, start: u64) -> Result<ChunkRecords, RecordFault> {
         let mut file = self.file.get_ref().try_clone()?;
         file.seek(SeekFrom::Start(start))?;
-        let bytes = BufReader::with_capacity(BUFFER, file).take(header.data_length);
+        let bytes = BufReader::with_capacity(buffer_size(header.data_length), file)
+            .take(header.data_length);
         let size = u32::from_le_bytes(header.number("size")?);
         let compression = match header.field("compression")? {
             b"none" => ChunkCompression::Stored,

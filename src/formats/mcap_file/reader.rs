@@ -3,7 +3,7 @@
 use super::chunk::{self, McapFault};
 use super::record::{MESSAGE_HEADER, McapRecord};
 use crate::FormatError;
-use crate::chunk_records::{ChunkRecords, read_bytes, skip_bytes};
+use crate::chunk_records::{ChunkRecords, buffer_size, read_bytes, skip_bytes};
 use crate::messages::{MAX_RECORD, MessageContainer, MessageHead, TopicChannel};
 use mcap::records::op;
 use std::collections::BTreeMap;
@@ -11,9 +11,6 @@ use std::fs::File;
 use std::io::{BufReader, ErrorKind, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-
-/// Bytes read at a time.
-const BUFFER: usize = 1 << 16;
 
 /// MCAP file, read record by record up to its summary. Its index is not used, so files without one are read too.
 pub(crate) struct McapMessages {
@@ -80,7 +77,7 @@ impl McapMessages {
         let io = |e| FormatError::io(path, e);
         let file = File::open(path).map_err(io)?;
         let length = file.metadata().map_err(io)?.len();
-        let mut file = BufReader::with_capacity(BUFFER, file);
+        let mut file = BufReader::with_capacity(buffer_size(length), file);
         let mut magic = Vec::new();
         let mut first = (&mut file).take(mcap::MAGIC.len() as u64);
         first.read_to_end(&mut magic).map_err(io)?;
@@ -139,7 +136,8 @@ impl McapMessages {
             op::CHUNK => {
                 let mut file = self.file.get_ref().try_clone()?;
                 file.seek(SeekFrom::Start(start))?;
-                let bytes = BufReader::with_capacity(BUFFER, file).take(prefix.length);
+                let bytes =
+                    BufReader::with_capacity(buffer_size(prefix.length), file).take(prefix.length);
                 self.chunk = Some(chunk::records(bytes, prefix.length)?);
                 return Ok(McapStep::Other);
             }
