@@ -17,6 +17,14 @@ pub(super) fn timestamp(time_ns: u64) -> Option<Timestamp> {
     })
 }
 
+/// Nanoseconds since the epoch of a protobuf timestamp; `None` where it is zero or no time.
+pub(super) fn nanoseconds(time: &Timestamp) -> Option<u64> {
+    const SECOND: u64 = 1_000_000_000;
+    let seconds = u64::try_from(time.seconds).ok()?.checked_mul(SECOND)?;
+    let time = seconds.checked_add(u64::try_from(time.nanos).ok()?)?;
+    (time != 0).then_some(time)
+}
+
 /// `foxglove.CameraCalibration`.
 #[derive(Clone, PartialEq, Message)]
 pub(super) struct CameraCalibration {
@@ -109,6 +117,13 @@ pub(super) struct FrameTransform {
     pub(super) translation: Option<Vector3>,
     #[prost(message, optional, tag = "5")]
     pub(super) rotation: Option<Quaternion>,
+}
+
+/// `foxglove.FrameTransforms`.
+#[derive(Clone, PartialEq, Message)]
+pub(super) struct FrameTransforms {
+    #[prost(message, repeated, tag = "1")]
+    pub(super) transforms: Vec<FrameTransform>,
 }
 
 /// Name, number and type of a field; a type that starts with a dot names a message.

@@ -8,8 +8,8 @@
 //!
 //! Camera and files:
 //!
-//! - Recordings: [`mod@recording`], [`mod@mcap_file`], [`mod@rgbd_folder`], [`mod@k4a_file`], [`mod@r3d_file`],
-//!   [`mod@npz_recording`]; rectified: [`mod@rectified`].
+//! - Recordings: [`mod@recording`], [`mod@rgbd_folder`], [`mod@k4a_file`], [`mod@r3d_file`], [`mod@npz_recording`];
+//!   messages ([`mod@messages`]) in [`mod@mcap_file`], [`mod@bag_file`] and [`mod@rosbag2`]; rectified: [`mod@rectified`].
 //! - Lossless depth compression: [`mod@image::depth_codec`].
 //! - Motion clips: [`mod@bvh`], [`mod@asf_amc`].
 //! - GlTF, OBJ, MakeHuman: [`mod@gltf`], [`mod@obj`], [`mod@mhclo`].
@@ -21,7 +21,9 @@
 #![allow(rustdoc::private_intra_doc_links)] // the index of ideas names private modules
 
 mod asf_amc;
+mod bag_file;
 mod bvh;
+mod chunk_records;
 mod depth_metres;
 mod error;
 pub mod fabric_json;
@@ -31,6 +33,7 @@ pub mod gltf;
 pub mod image;
 mod k4a_file;
 mod mcap_file;
+mod messages;
 pub mod mhclo;
 pub mod morph_target;
 mod motion;
@@ -50,6 +53,7 @@ mod recording;
 mod rectified;
 mod rgbd_folder;
 mod rgbd_source;
+mod rosbag2;
 pub mod scan;
 pub mod sewn_obj;
 mod shared_data;
@@ -59,7 +63,7 @@ mod zip_entries;
 
 pub use error::FormatError;
 pub use k4a_file::K4aReader;
-pub use mcap_file::{McapReader, McapWriter};
+pub use mcap_file::McapWriter;
 pub use motion::read_motion;
 pub use motion_clip::MotionClip;
 pub use npy_frames::NpyFrames;
@@ -67,7 +71,7 @@ pub use npz_recording::NpzReader;
 pub use obj_scene::write_obj_scene;
 pub use position_codec::{PositionCoder, STEP as POSITION_STEP};
 pub use r3d_file::R3dReader;
-pub use recording::{RecordingOptions, open_recording, open_recording_with};
+pub use recording::{RECORDING_EXTENSIONS, RecordingOptions, open_recording, open_recording_with};
 pub use rectified::Rectified;
 pub use rgbd_folder::{RgbdFolder, RgbdFolderWriter, depth_to_mm, read_camera};
 pub use rgbd_source::RgbdSource;

@@ -1,302 +1,278 @@
-//! Reads RGBD frames from an MCAP file as a stream, with memory for one frame.
+//! Messages of an MCAP file as a stream: chunk after chunk, each with a decompressor of its own.
 
-use super::message::{MessageContext, MessageItem};
-use super::record::McapRecord;
+use super::chunk::{self, McapFault};
+use super::record::{MESSAGE_HEADER, McapRecord};
 use crate::FormatError;
-use crate::foxglove::{CameraCalibration, FrameTransform};
-use crate::rgbd_source::RgbdSource;
-use mcap::McapError;
-use mcap::sans_io::linear_reader::{LinearReadEvent, LinearReader, LinearReaderOptions};
-use nalgebra::{Quaternion, UnitQuaternion, Vector3};
+use crate::chunk_records::{ChunkRecords, buffer_size, read_bytes, skip_bytes};
+use crate::messages::{MAX_RECORD, MessageContainer, MessageHead, TopicChannel};
+use mcap::records::op;
 use std::collections::BTreeMap;
 use std::fs::File;
-use std::io::{BufReader, Read, Seek, SeekFrom};
+use std::io::{BufReader, ErrorKind, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
-use tryon_geometry::camera::{Calibration, ColorImage, Intrinsics, RgbdFrame};
-use tryon_geometry::math::{Camera, ColorCamera, Rigid};
+use std::sync::Arc;
 
-/// Largest record, bytes: an uncompressed colour image of 4096 × 4096 has 48 MiB. A greater length is refused before
-/// anything is allocated.
-const MAX_RECORD: usize = 64 << 20;
-
-/// Largest time between colour and its depth, nanoseconds: one frame at 30 Hz. Older colour shows another pose.
-const MAX_GAP_NS: u64 = 33_400_000;
-
-/// Depth images searched for calibrations: writers repeat them at least once a second.
-const LOOK_AHEAD: usize = 60;
-
-/// Read buffer, bytes.
-const BUFFER: usize = 1 << 16;
-
-/// An MCAP recording, read frame by frame. A truncated file ends at the last whole record.
-pub struct McapReader {
+/// MCAP file, read record by record up to its summary. Its index is not used, so files without one are read too.
+pub(crate) struct McapMessages {
     path: PathBuf,
+    /// Shares its position with the chunk being read, and seeks after it.
     file: BufReader<File>,
-    records: LinearReader,
-    /// Names of schemas by number, and of channels' schemas by channel.
+    /// Bytes of the file.
+    length: u64,
+    /// Position of the next record of the file.
+    next: u64,
+    chunk: Option<ChunkRecords>,
+    /// Names of schemas by number.
     schemas: BTreeMap<u16, String>,
-    channels: BTreeMap<u16, String>,
-    calibration: Calibration,
-    color: Option<(u64, ColorImage)>,
+    channels: BTreeMap<u16, Arc<TopicChannel>>,
+    buffer: Vec<u8>,
     messages: u64,
+    is_ended: bool,
+    is_cut_short: bool,
 }
 
-impl std::fmt::Debug for McapReader {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.debug_struct("McapReader")
-            .field("path", &self.path)
-            .field("messages", &self.messages)
-            .finish()
+/// Step of reading.
+enum McapStep {
+    /// Message of a wanted channel.
+    Message(MessageHead),
+    /// Another record, or the end of a chunk.
+    Other,
+    /// End of the messages.
+    End,
+}
+
+/// Code and length of a record.
+#[derive(Clone, Copy, Debug)]
+struct RecordPrefix {
+    opcode: u8,
+    /// Bytes of its content.
+    length: u64,
+}
+
+impl RecordPrefix {
+    /// Reads a prefix; `None` at the end.
+    fn read(from: &mut dyn Read) -> Result<Option<Self>, McapFault> {
+        let mut bytes = [0; 9];
+        if from.read(&mut bytes[..1])? == 0 {
+            return Ok(None);
+        }
+        from.read_exact(&mut bytes[1..])?;
+        let [opcode, length @ ..] = bytes;
+        Ok(Some(Self {
+            opcode,
+            length: u64::from_le_bytes(length),
+        }))
+    }
+    fn field(self, part: &str) -> String {
+        format!("record 0x{:02x}.{part}", self.opcode)
     }
 }
 
-fn records() -> LinearReader {
-    LinearReader::new_with_options(
-        LinearReaderOptions::default()
-            .with_record_length_limit(MAX_RECORD)
-            .with_validate_chunk_crcs(true),
-    )
-}
-
-impl McapReader {
-    /// Opens a file and reads its calibration.
+impl McapMessages {
+    /// Opens a file at its start.
     ///
     /// # Errors
-    /// Not an MCAP file, no 16-bit depth, no calibration for it, or a damaged start.
-    pub fn open(path: &Path) -> Result<Self, FormatError> {
-        let file = File::open(path).map_err(|e| FormatError::io(path, e))?;
-        let mut reader = Self {
+    /// Those of the system, or another magic.
+    pub(crate) fn open(path: &Path) -> Result<Box<dyn MessageContainer>, FormatError> {
+        let io = |e| FormatError::io(path, e);
+        let file = File::open(path).map_err(io)?;
+        let length = file.metadata().map_err(io)?.len();
+        let mut file = BufReader::with_capacity(buffer_size(length), file);
+        let mut magic = Vec::new();
+        let mut first = (&mut file).take(mcap::MAGIC.len() as u64);
+        first.read_to_end(&mut magic).map_err(io)?;
+        if magic != mcap::MAGIC {
+            let why = "expected that of MCAP, version 0";
+            return Err(FormatError::field(path, "magic", why));
+        }
+        Ok(Box::new(Self {
             path: path.to_owned(),
-            file: BufReader::with_capacity(BUFFER, file),
-            records: records(),
+            file,
+            length,
+            next: mcap::MAGIC.len() as u64,
+            chunk: None,
             schemas: BTreeMap::new(),
             channels: BTreeMap::new(),
-            calibration: Calibration::registered(Intrinsics::KINECT_V1),
-            color: None,
+            buffer: Vec::new(),
             messages: 0,
-        };
-        reader.calibration = reader.find_calibration()?;
-        reader.rewind()?;
-        Ok(reader)
+            is_ended: false,
+            is_cut_short: false,
+        }))
     }
 
-    fn fault(&self, field: impl Into<String>, why: impl Into<String>) -> FormatError {
-        FormatError::field(&self.path, field, why)
+    fn step(
+        &mut self,
+        is_wanted: &dyn Fn(&TopicChannel) -> bool,
+        data: &mut Vec<u8>,
+    ) -> Result<McapStep, McapFault> {
+        let Some(mut chunk) = self.chunk.take() else {
+            return self.file_record(is_wanted, data);
+        };
+        let step = match RecordPrefix::read(&mut chunk) {
+            Ok(None) => {
+                self.file.seek(SeekFrom::Start(self.next))?;
+                return Ok(McapStep::Other);
+            }
+            Ok(Some(prefix)) => self.record(prefix, &mut chunk, is_wanted, data),
+            Err(fault) => Err(fault),
+        };
+        // Also after a fault: it lies in the chunk.
+        self.chunk = Some(chunk);
+        step
     }
 
-    fn find_calibration(&mut self) -> Result<Calibration, FormatError> {
-        let (mut cameras, mut transforms) = (BTreeMap::new(), Vec::new());
-        let (mut depth, mut color) = (None, None);
-        let mut depths = 0;
-        while depths < LOOK_AHEAD {
-            match self.next_item()? {
-                None => break,
-                Some(MessageItem::Depth { frame_id, .. }) => {
-                    depth.get_or_insert(frame_id);
-                    depths += 1;
-                }
-                Some(MessageItem::Color { frame_id, .. }) => {
-                    color.get_or_insert(frame_id);
-                }
-                Some(MessageItem::Calibration(c)) => {
-                    cameras.insert(c.frame_id.clone(), c);
-                }
-                Some(MessageItem::Transform(t)) => transforms.push(t),
+    /// Reads a record of the file itself; chunks are opened, indices and attachments skipped.
+    fn file_record(
+        &mut self,
+        is_wanted: &dyn Fn(&TopicChannel) -> bool,
+        data: &mut Vec<u8>,
+    ) -> Result<McapStep, McapFault> {
+        let end = || McapFault::Io(ErrorKind::UnexpectedEof.into());
+        let prefix = RecordPrefix::read(&mut self.file)?.ok_or_else(end)?;
+        let start = self.file.stream_position()?;
+        self.next = start.saturating_add(prefix.length);
+        match prefix.opcode {
+            op::DATA_END | op::FOOTER => return Ok(McapStep::End),
+            op::CHUNK => {
+                let mut file = self.file.get_ref().try_clone()?;
+                file.seek(SeekFrom::Start(start))?;
+                let bytes =
+                    BufReader::with_capacity(buffer_size(prefix.length), file).take(prefix.length);
+                self.chunk = Some(chunk::records(bytes, prefix.length)?);
+                return Ok(McapStep::Other);
             }
-            // Two depth images: every topic has had a message.
-            let known =
-                |frame: &Option<String>| frame.as_ref().is_none_or(|f| cameras.contains_key(f));
-            if depths >= 2 && known(&depth) && known(&color) {
-                break;
-            }
-        }
-        let Some(depth) = depth else {
-            return Err(self.fault(
-                "foxglove.RawImage",
-                "no depth image (encoding 16UC1 or mono16)",
-            ));
-        };
-        let Some(camera) = cameras.get(&depth) else {
-            return Err(self.fault(
-                "foxglove.CameraCalibration",
-                format!("none for frame_id `{depth}`"),
-            ));
-        };
-        let depth_camera = self.intrinsics(camera)?;
-        let separate = color
-            .filter(|c| *c != depth)
-            .and_then(|c| cameras.get(&c).map(|k| (c, k)));
-        let Some((color, camera)) = separate else {
-            return Ok(Calibration::registered(depth_camera));
-        };
-        let color_camera = self.intrinsics(camera)?;
-        let mut color_from_depth = Rigid::identity();
-        for t in &transforms {
-            let forward = t.parent_frame_id == depth && t.child_frame_id == color;
-            if forward || (t.parent_frame_id == color && t.child_frame_id == depth) {
-                let pose: Rigid<Camera, ColorCamera> = self.pose(t)?;
-                color_from_depth = if forward {
-                    pose.inverse()
-                } else {
-                    Rigid::new(*pose.iso())
-                };
+            op::SCHEMA | op::CHANNEL | op::MESSAGE => {}
+            _ if self.next > self.length => return Err(end()),
+            _ => {
+                self.file.seek(SeekFrom::Start(self.next))?;
+                return Ok(McapStep::Other);
             }
         }
-        Ok(Calibration {
-            depth: depth_camera,
-            color: Some(color_camera),
-            color_from_depth,
-        })
+        let mut from = self.file.get_ref().try_clone()?;
+        from.seek(SeekFrom::Start(start))?;
+        let step = self.record(prefix, &mut from, is_wanted, data)?;
+        self.file.seek(SeekFrom::Start(self.next))?;
+        Ok(step)
     }
 
-    fn intrinsics(&self, c: &CameraCalibration) -> Result<Intrinsics, FormatError> {
-        let field = |name: &str| format!("foxglove.CameraCalibration({}).{name}", c.frame_id);
-        let [fx, _, cx, _, fy, cy, ..] = c.k[..] else {
-            return Err(self.fault(field("K"), format!("{} values, expected 9", c.k.len())));
-        };
-        let k = Intrinsics {
-            width: c.width,
-            height: c.height,
-            fx,
-            fy,
-            cx,
-            cy,
-        };
-        k.validated()
-            .map_err(|e| self.fault(field(e.field), format!("{}, expected {}", e.value, e.why)))
-    }
-
-    fn pose(&self, t: &FrameTransform) -> Result<Rigid<Camera, ColorCamera>, FormatError> {
-        let (Some(p), Some(q)) = (t.translation, t.rotation) else {
-            return Ok(Rigid::identity());
-        };
-        let rotation = Quaternion::new(q.w, q.x, q.y, q.z);
-        let pose = Rigid::from_parts(
-            Vector3::new(p.x, p.y, p.z),
-            UnitQuaternion::from_quaternion(rotation),
-        );
-        if pose.is_finite() {
-            Ok(pose)
-        } else {
-            Err(self.fault("foxglove.FrameTransform", "not a finite pose"))
+    /// Reads the content of a schema, a channel or a message; skips others.
+    fn record(
+        &mut self,
+        prefix: RecordPrefix,
+        from: &mut dyn Read,
+        is_wanted: &dyn Fn(&TopicChannel) -> bool,
+        data: &mut Vec<u8>,
+    ) -> Result<McapStep, McapFault> {
+        let RecordPrefix { opcode, length } = prefix;
+        if !matches!(opcode, op::SCHEMA | op::CHANNEL | op::MESSAGE) {
+            skip_bytes(from, length)?;
+            return Ok(McapStep::Other);
         }
-    }
-
-    /// Next message of interest; `None` at the end, also of a truncated file.
-    fn next_item(&mut self) -> Result<Option<MessageItem>, FormatError> {
-        loop {
-            let Some(event) = self.records.next_event() else {
-                return Ok(None);
-            };
-            match event {
-                Ok(LinearReadEvent::ReadRequest(n)) => {
-                    // At most a buffer at a time: a wrong length costs no more memory than the file holds.
-                    let want = self.records.insert(n.min(BUFFER));
-                    let got = self
-                        .file
-                        .read(want)
-                        .map_err(|e| FormatError::io(&self.path, e))?;
-                    self.records.notify_read(got);
-                }
-                Ok(LinearReadEvent::Record { opcode, data }) => {
-                    let record = McapRecord::parse(opcode, data).map_err(|part| {
-                        let field = format!("record 0x{opcode:02x}.{part}");
-                        FormatError::field(&self.path, field, "cut short, or no text")
-                    })?;
-                    match record {
-                        Some(McapRecord::Schema { id, name }) => {
-                            self.schemas.insert(id, name.to_owned());
-                        }
-                        Some(McapRecord::Channel { id, schema }) => {
-                            let name = self.schemas.get(&schema).cloned().unwrap_or_default();
-                            self.channels.insert(id, name);
-                        }
-                        Some(McapRecord::Message {
-                            channel,
-                            sequence,
-                            log_time,
-                            data,
-                        }) => {
-                            self.messages += 1;
-                            let schema = self.channels.get(&channel).map_or("", String::as_str);
-                            let at = MessageContext {
-                                path: &self.path,
-                                schema,
-                                message: self.messages,
-                            };
-                            if let Some(item) = at.item(sequence, log_time, data)? {
-                                return Ok(Some(item));
-                            }
-                        }
-                        None => {}
-                    }
-                }
-                Err(McapError::UnexpectedEof | McapError::UnexpectedEoc) if self.messages > 0 => {
-                    return Ok(None);
-                }
-                Err(e) => {
-                    let why = e.to_string();
-                    return Err(self.fault(format!("after message {}", self.messages), why));
-                }
+        if length > MAX_RECORD as u64 {
+            let why = format!("{length} bytes, which exceeds limit of {MAX_RECORD}");
+            return Err(McapFault::field(prefix.field("length"), why));
+        }
+        let header = match opcode {
+            op::MESSAGE => length.min(MESSAGE_HEADER),
+            _ => length,
+        };
+        let mut buffer = std::mem::take(&mut self.buffer);
+        read_bytes(from, header, &mut buffer)?;
+        let parsed = McapRecord::parse(opcode, &buffer);
+        let record =
+            parsed.map_err(|part| McapFault::field(prefix.field(part), "cut short, or no text"))?;
+        let head = record.and_then(|record| self.take_record(record));
+        self.buffer = buffer;
+        match head.filter(|head| is_wanted(&head.channel)) {
+            Some(head) => {
+                read_bytes(from, length - header, data)?;
+                Ok(McapStep::Message(head))
+            }
+            None => {
+                skip_bytes(from, length - header)?;
+                Ok(McapStep::Other)
             }
         }
+    }
+
+    /// Keeps schemas and channels; the head of a message whose channel is known.
+    fn take_record(&mut self, record: McapRecord<'_>) -> Option<MessageHead> {
+        match record {
+            McapRecord::Schema { id, name } => {
+                self.schemas.insert(id, name.to_owned());
+                None
+            }
+            McapRecord::Channel {
+                id,
+                schema,
+                topic,
+                encoding,
+            } => {
+                let schema = self.schemas.get(&schema).map_or("", String::as_str);
+                let channel = TopicChannel::new(topic, schema, encoding);
+                self.channels.insert(id, Arc::new(channel));
+                None
+            }
+            McapRecord::Message {
+                channel,
+                sequence,
+                log_time,
+            } => {
+                self.messages += 1;
+                Some(MessageHead {
+                    channel: self.channels.get(&channel)?.clone(),
+                    sequence,
+                    log_time_ns: log_time,
+                    number: self.messages,
+                })
+            }
+        }
+    }
+
+    /// Ends the stream: silently where the file does after its first message, else with an error.
+    fn end(&mut self, fault: McapFault) -> Result<(), FormatError> {
+        self.is_ended = true;
+        let is_past_the_end = self.chunk.is_none() || self.next > self.length;
+        let (field, why) = match fault {
+            McapFault::Field(field, why) => (field, why),
+            McapFault::Io(e) if e.kind() != ErrorKind::UnexpectedEof => {
+                ("chunk".into(), format!("damaged ({e})"))
+            }
+            McapFault::Io(_) if !is_past_the_end => {
+                let why = "damaged: fewer bytes than it states";
+                ("chunk".into(), why.into())
+            }
+            McapFault::Io(_) if self.messages > 0 => {
+                self.is_cut_short = true;
+                return Ok(());
+            }
+            McapFault::Io(_) => ("record".into(), "the file is cut short".into()),
+        };
+        let field = format!("after message {}, {field}", self.messages);
+        Err(FormatError::field(&self.path, field, why))
     }
 }
 
-impl RgbdSource for McapReader {
-    fn calibration(&self) -> &Calibration {
-        &self.calibration
-    }
-    fn len(&self) -> Option<usize> {
-        None
-    }
-    fn next_frame(&mut self) -> Result<Option<RgbdFrame>, FormatError> {
-        while let Some(item) = self.next_item()? {
-            match item {
-                MessageItem::Color { time_ns, image, .. } => self.color = Some((time_ns, image)),
-                MessageItem::Depth {
-                    sequence,
-                    time_ns,
-                    image,
-                    ..
-                } => {
-                    let want = &self.calibration.depth;
-                    if (image.width(), image.height()) != (want.width, want.height) {
-                        let why = format!(
-                            "{}×{}, but the calibration says {}×{}",
-                            image.width(),
-                            image.height(),
-                            want.width,
-                            want.height
-                        );
-                        return Err(
-                            self.fault(format!("message {}: depth size", self.messages), why)
-                        );
-                    }
-                    let color = self
-                        .color
-                        .take_if(|(t, _)| t.abs_diff(time_ns) <= MAX_GAP_NS)
-                        .map(|(_, c)| c);
-                    return Ok(Some(RgbdFrame {
-                        sequence: sequence.into(),
-                        time_ns,
-                        depth: image,
-                        color,
-                    }));
-                }
-                MessageItem::Calibration(_) | MessageItem::Transform(_) => {}
+impl MessageContainer for McapMessages {
+    fn next_message(
+        &mut self,
+        is_wanted: &dyn Fn(&TopicChannel) -> bool,
+        data: &mut Vec<u8>,
+    ) -> Result<Option<MessageHead>, FormatError> {
+        while !self.is_ended {
+            match self.step(is_wanted, data) {
+                Ok(McapStep::Message(head)) => return Ok(Some(head)),
+                Ok(McapStep::Other) => {}
+                Ok(McapStep::End) => self.is_ended = true,
+                Err(fault) => self.end(fault)?,
             }
         }
         Ok(None)
     }
-    fn rewind(&mut self) -> Result<(), FormatError> {
-        self.file
-            .seek(SeekFrom::Start(0))
-            .map_err(|e| FormatError::io(&self.path, e))?;
-        self.records = records();
-        self.schemas.clear();
-        self.channels.clear();
-        (self.color, self.messages) = (None, 0);
-        Ok(())
+    fn channels(&self) -> Vec<Arc<TopicChannel>> {
+        self.channels.values().cloned().collect()
+    }
+    fn is_cut_short(&self) -> bool {
+        self.is_cut_short
     }
 }

@@ -1,24 +1,32 @@
 //! Records of an MCAP file that lead to messages, <https://mcap.dev/spec>.
 //!
 //! Read here rather than by the `mcap` crate: its parser allocates the length that a string states before it looks
-//! whether the record has that many bytes, and slices short attachments out of range.
+//! whether the record has that many bytes, its reader the length of a record in a chunk, and a record that leads out of
+//! its chunk overflows a subtraction.
 
 use mcap::records::op;
+
+/// Bytes of a message's record before its data.
+pub(super) const MESSAGE_HEADER: u64 = 22;
 
 /// Record on the way to a message.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum McapRecord<'a> {
     /// Schema and its name.
     Schema { id: u16, name: &'a str },
-    /// Channel and its schema.
-    Channel { id: u16, schema: u16 },
-    /// Message of a channel.
+    /// Channel, its schema, topic and message encoding.
+    Channel {
+        id: u16,
+        schema: u16,
+        topic: &'a str,
+        encoding: &'a str,
+    },
+    /// Header of a channel's message; data follow.
     Message {
         channel: u16,
         sequence: u32,
         /// Nanoseconds.
         log_time: u64,
-        data: &'a [u8],
     },
 }
 
@@ -32,37 +40,38 @@ impl<'a> McapRecord<'a> {
         Ok(Some(match opcode {
             op::SCHEMA => {
                 let id = u16::from_le_bytes(take(&mut rest).ok_or("id")?);
-                let length = u32::from_le_bytes(take(&mut rest).ok_or("name")?);
-                let name = rest.get(..length as usize).ok_or("name")?;
-                let name = std::str::from_utf8(name).map_err(|_| "name")?;
+                let name = text(&mut rest).ok_or("name")?;
                 Self::Schema { id, name }
             }
             op::CHANNEL => Self::Channel {
                 id: u16::from_le_bytes(take(&mut rest).ok_or("id")?),
                 schema: u16::from_le_bytes(take(&mut rest).ok_or("schema_id")?),
+                topic: text(&mut rest).ok_or("topic")?,
+                encoding: text(&mut rest).ok_or("message_encoding")?,
             },
-            op::MESSAGE => {
-                let channel = u16::from_le_bytes(take(&mut rest).ok_or("channel_id")?);
-                let sequence = u32::from_le_bytes(take(&mut rest).ok_or("sequence")?);
-                let log_time = u64::from_le_bytes(take(&mut rest).ok_or("log_time")?);
-                let _publish_time: [u8; 8] = take(&mut rest).ok_or("publish_time")?;
-                Self::Message {
-                    channel,
-                    sequence,
-                    log_time,
-                    data: rest,
-                }
-            }
+            op::MESSAGE => Self::Message {
+                channel: u16::from_le_bytes(take(&mut rest).ok_or("channel_id")?),
+                sequence: u32::from_le_bytes(take(&mut rest).ok_or("sequence")?),
+                log_time: u64::from_le_bytes(take(&mut rest).ok_or("log_time")?),
+            },
             _ => return Ok(None),
         }))
     }
 }
 
 /// Takes `N` bytes off the front.
-fn take<const N: usize>(rest: &mut &[u8]) -> Option<[u8; N]> {
+pub(super) fn take<const N: usize>(rest: &mut &[u8]) -> Option<[u8; N]> {
     let (head, tail) = rest.split_first_chunk()?;
     *rest = tail;
     Some(*head)
+}
+
+/// Takes a text with its length off the front.
+pub(super) fn text<'a>(rest: &mut &'a [u8]) -> Option<&'a str> {
+    let length = u32::from_le_bytes(take(rest)?);
+    let (head, tail) = rest.split_at_checked(length as usize)?;
+    *rest = tail;
+    std::str::from_utf8(head).ok()
 }
 
 #[cfg(test)]

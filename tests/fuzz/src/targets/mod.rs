@@ -98,6 +98,8 @@ pub const TARGETS: &[Target] = &[
     garments::PATTERN,
     garments::SCENE,
     recordings::MCAP,
+    recordings::BAG,
+    recordings::SQLITE,
     recordings::FOLDER,
     secrets::TOKEN,
     secrets::SEALED,

@@ -1,4 +1,4 @@
-//! Recordings: MCAP files and RGBD folders.
+//! Recordings: MCAP files, ROS bags, rosbag2 databases and RGBD folders.
 
 use super::{Target, packed, text};
 use crate::bundle::Bundle;
@@ -28,11 +28,51 @@ pub(super) const MCAP: Target = Target::new(
         });
         let raw = file.0.first().map_or_else(Vec::new, |m| m.bytes.clone());
         let messages = pack::unpack_mcap(&raw).unwrap_or_default();
-        vec![Bundle::of("a.mcap", raw), messages]
+        let others = [
+            &include_bytes!("../../../../src/formats/testdata/recordings/compressed_ros1.mcap")[..],
+            include_bytes!("../../../../src/formats/testdata/recordings/compressed_ros2.mcap"),
+        ];
+        let mut seeds = vec![Bundle::of("a.mcap", raw), messages];
+        seeds.extend(others.map(|file| Bundle::of("a.mcap", file)));
+        seeds
     },
 )
 .words("16UC1 mono16 rgb8 jpeg png depth_camera color_camera")
 .allow(2 << 20, 60_000);
+
+/// ROS bags, as raw files.
+pub(super) const BAG: Target = Target::new(
+    "bag",
+    "src/formats/bag_file",
+    |b, scratch| frames(&scratch.file("a.bag", b.first())?),
+    || {
+        let files = [
+            &include_bytes!("../../../../src/formats/testdata/recordings/ros1_bz2.bag")[..],
+            include_bytes!("../../../../src/formats/testdata/recordings/ros1_lz4.bag"),
+        ];
+        files.map(|file| Bundle::of("a.bag", file)).to_vec()
+    },
+)
+.words("op= conn= topic= type= compression= size= none bz2 lz4 16UC1 bgr8 sensor_msgs/Image")
+.allow(2 << 20, 60_000);
+
+/// rosbag2 databases, as raw files.
+pub(super) const SQLITE: Target = Target {
+    longest: 64 << 10,
+    ..Target::new(
+        "rosbag2",
+        "src/formats/rosbag2",
+        |b, scratch| frames(&scratch.file("a.db3", b.first())?),
+        || {
+            let file = include_bytes!(
+                "../../../../src/formats/testdata/recordings/ros2_sqlite/ros2_sqlite.db3"
+            );
+            vec![Bundle::of("a.db3", *file)]
+        },
+    )
+    .words("messages topics topic_id timestamp data cdr 16UC1 bgr8 sensor_msgs/msg/Image")
+    .allow(2 << 20, 60_000)
+};
 
 /// RGBD folders.
 pub(super) const FOLDER: Target = Target::new(

@@ -1,0 +1,134 @@
+//! Pairs of two streams by nearest time.
+//!
+//! Each stream has a reader of its own, so their order in the file does not matter, and memory holds one item of the
+//! first stream and two of the second.
+
+/// Largest time between the items of a pair, nanoseconds: one frame at 30 Hz. Older colour shows another pose.
+pub(super) const MAX_GAP_NS: u64 = 33_400_000;
+
+/// Items around a time, of a stream whose times ascend.
+#[derive(Debug)]
+pub(super) struct NearestItem<T> {
+    /// Latest item at or before the time asked for.
+    before: Option<(u64, T)>,
+    /// First item after it.
+    after: Option<(u64, T)>,
+    is_ended: bool,
+}
+
+impl<T> NearestItem<T> {
+    pub(super) fn new() -> Self {
+        Self {
+            before: None,
+            after: None,
+            is_ended: false,
+        }
+    }
+
+    /// The item that pairs with time `at`: the nearest one within [`MAX_GAP_NS`], unless a neighbour of `at` in its own
+    /// stream is nearer to it. `next` yields items in order.
+    ///
+    /// # Errors
+    /// Those of `next`.
+    pub(super) fn pair<E>(
+        &mut self,
+        at: u64,
+        neighbours: [Option<u64>; 2],
+        mut next: impl FnMut() -> Result<Option<(u64, T)>, E>,
+    ) -> Result<Option<&T>, E> {
+        while !self.is_ended && self.after.as_ref().is_none_or(|(t, _)| *t <= at) {
+            if let Some(passed) = self.after.take() {
+                self.before = Some(passed);
+            }
+            match next()? {
+                Some(item) => self.after = Some(item),
+                None => self.is_ended = true,
+            }
+        }
+        if self.is_ended && self.after.as_ref().is_some_and(|(t, _)| *t <= at) {
+            self.before = self.after.take();
+        }
+        let around = [&self.before, &self.after].into_iter().flatten();
+        let nearest = around.min_by_key(|(t, _)| t.abs_diff(at));
+        Ok(nearest.and_then(|(t, item)| {
+            let gap = t.abs_diff(at);
+            let is_taken = neighbours
+                .into_iter()
+                .flatten()
+                .any(|n| n.abs_diff(*t) < gap);
+            (gap <= MAX_GAP_NS && !is_taken).then_some(item)
+        }))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    const MS: u64 = 1_000_000;
+
+    /// Colour time of each depth time.
+    fn pairs(depth: &[u64], color: &[u64]) -> Vec<Option<u64>> {
+        let mut colors = color.iter().copied();
+        let mut nearest = NearestItem::new();
+        let mut out = Vec::new();
+        for (i, &at) in depth.iter().enumerate() {
+            let neighbour = |k: Option<usize>| k.and_then(|k| depth.get(k).copied());
+            let neighbours = [neighbour(i.checked_sub(1)), neighbour(Some(i + 1))];
+            let next = || Ok::<_, ()>(colors.next().map(|t| (t, t)));
+            out.push(
+                nearest
+                    .pair(at, neighbours, next)
+                    .expect("no errors")
+                    .copied(),
+            );
+        }
+        out
+    }
+
+    #[test]
+    fn the_nearest_color_pairs_also_when_it_is_later() {
+        let depth = [0, 33, 66, 99].map(|t| t * MS);
+        let color = [10, 43, 60, 70].map(|t| t * MS);
+        let want = [Some(10), Some(43), Some(70), None].map(|t| t.map(|t: u64| t * MS));
+        assert_eq!(pairs(&depth, &color), want);
+        assert_eq!(pairs(&depth, &[]), [None; 4]);
+        let far = pairs(&[0, 1000 * MS], &[500 * MS]);
+        assert_eq!(far, [None, None]);
+    }
+
+    #[test]
+    fn a_missing_color_is_not_replaced_by_its_neighbours() {
+        let depth = [0, 33, 66, 99].map(|t| t * MS);
+        let color = [0, 33, 99].map(|t| t * MS);
+        let want = [Some(0), Some(33 * MS), None, Some(99 * MS)];
+        assert_eq!(pairs(&depth, &color), want);
+    }
+
+    proptest! {
+        #[test]
+        fn pairs_are_those_of_a_full_search(
+            mut depth in prop::collection::vec(0u64..400, 0..20),
+            mut color in prop::collection::vec(0u64..400, 0..20),
+        ) {
+            depth.sort_unstable();
+            depth.dedup();
+            color.sort_unstable();
+            let (depth, color): (Vec<u64>, Vec<u64>) =
+                (depth.iter().map(|t| t * MS).collect(), color.iter().map(|t| t * MS).collect());
+            for (at, got) in depth.iter().zip(pairs(&depth, &color)) {
+                let gap = color.iter().map(|c| c.abs_diff(*at)).min();
+                if let Some(c) = got {
+                    prop_assert_eq!(Some(c.abs_diff(*at)), gap);
+                    prop_assert!(depth.iter().all(|d| d.abs_diff(c) >= c.abs_diff(*at)));
+                    prop_assert!(c.abs_diff(*at) <= MAX_GAP_NS);
+                } else if let Some(gap) = gap.filter(|g| *g <= MAX_GAP_NS) {
+                    // Every nearest colour is nearer to another depth.
+                    let mut nearest = color.iter().filter(|c| c.abs_diff(*at) == gap);
+                    prop_assert!(nearest.any(|c| depth.iter().any(|d| d.abs_diff(*c) < gap)));
+                }
+            }
+        }
+    }
+}
