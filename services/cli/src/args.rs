@@ -21,6 +21,7 @@ pub(crate) use token::{
 };
 
 use crate::input::GivenChoice;
+use crate::recording::RecordingArgs;
 use clap::{Args, Parser, Subcommand};
 use std::path::PathBuf;
 
@@ -82,9 +83,11 @@ pub(crate) enum Command {
 
 #[derive(Debug, Args)]
 pub(crate) struct RunArgs {
-    /// An .mcap file, or a folder with camera.json, depth/ and maybe rgb/.
+    /// A recording: an RGBD folder, .mcap, .bag, .db3 or a rosbag2 folder, Azure Kinect's .mkv, Record3D's .r3d, or .npz.
     #[arg(long, value_name = "REC")]
     pub(crate) input: PathBuf,
+    #[command(flatten)]
+    pub(crate) recording: RecordingArgs,
     /// Garments: names (see `tryon export --list`), pattern files (.json, ours or GarmentCode's), layered as they say, or
     /// meshes (.obj with or without stitches, .glb, .gltf, MakeHuman's .mhclo), or captures (the folder that `tryon
     /// clothcap capture` wrote for all its garments, FOLDER/top, FOLDER/under, FOLDER/bottom … for one).
@@ -141,9 +144,11 @@ impl RunArgs {
 
 #[derive(Debug, Args)]
 pub(crate) struct TrackArgs {
-    /// An .mcap file, or a folder with camera.json and depth/.
+    /// A recording: an RGBD folder, .mcap, .bag, .db3 or a rosbag2 folder, Azure Kinect's .mkv, Record3D's .r3d, or .npz.
     #[arg(long, value_name = "REC")]
     pub(crate) input: PathBuf,
+    #[command(flatten)]
+    pub(crate) recording: RecordingArgs,
     /// Body template in SMPL layout; the embedded body without it.
     #[arg(long, value_name = "NPZ")]
     pub(crate) body: Option<PathBuf>,
@@ -213,9 +218,12 @@ pub(crate) struct CompositeArgs {
 #[derive(Debug, Args)]
 pub(crate) struct ImportArgs {
     /// A body (.npz in SMPL layout), a garment (.obj with or without stitches, .glb, MakeHuman's .mhclo, a sewing pattern
-    /// of ours or GarmentCode's .json), a measured fabric (.json), or a recording (.mcap or folder).
+    /// of ours or GarmentCode's .json), a measured fabric (.json), or a recording (.mcap, .bag, .db3, .mkv, .r3d, .npz with
+    /// depth, or a folder).
     #[arg(value_name = "FILE")]
     pub(crate) input: PathBuf,
+    #[command(flatten)]
+    pub(crate) recording: RecordingArgs,
     /// Checked copy to write (.obj or .glb for bodies and garments, .json for patterns, .mcap or a folder for
     /// recordings).
     #[arg(long, value_name = "FILE")]

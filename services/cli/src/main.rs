@@ -29,6 +29,7 @@ mod offline_files;
 mod onebox;
 mod overlay;
 mod preview;
+mod recording;
 mod report;
 mod say;
 mod viewer;

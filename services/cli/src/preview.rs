@@ -3,7 +3,7 @@
 use crate::args::RunArgs;
 use crate::input;
 use anyhow::{Context, Result};
-use tryon::formats::{RgbdSource, open_recording};
+use tryon::formats::RgbdSource;
 use tryon::geometry::camera::RgbdFrame;
 use tryon::mirror::{Mirror, MirrorFrame};
 
@@ -40,7 +40,7 @@ impl Preview {
     /// Bad input, named.
     pub(crate) fn open(args: &RunArgs) -> Result<Self> {
         let choices = input::choices(&args.garments, &args.given())?;
-        let mut source = open_recording(&args.input)?;
+        let mut source = args.recording.open(&args.input)?;
         let template = input::template(args.body.as_deref())?;
         let mirror = Mirror::new(template, source.calibration(), choices);
         let most = args.frames.unwrap_or(usize::MAX);

@@ -8,6 +8,7 @@ mod jpeg;
 pub(crate) mod limits;
 mod png_file;
 mod sample;
+mod yuv;
 
 pub use depth_codec::{decode_depth, encode_depth};
 pub use files::{decode_color, read_color, read_png_depth, write_png_depth, write_png_rgb};
@@ -16,3 +17,4 @@ pub use limits::{MAX_PIXELS, MAX_SIDE};
 pub(super) use limits::{check_size, read_limited};
 pub use png_file::{decode_png_color, decode_png_depth, encode_png_depth, encode_png_rgb};
 pub use sample::sample_texture;
+pub use yuv::{yuv_to_rgb, yuyv_to_rgb};

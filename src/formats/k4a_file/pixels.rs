@@ -1,6 +1,6 @@
 //! Pixels of an Azure Kinect's frames: 16-bit depth, and colour as MJPG, NV12, YUY2 or BGRA.
 
-use crate::image::decode_jpeg;
+use crate::image::{decode_jpeg, yuv_to_rgb, yuyv_to_rgb};
 use tryon_geometry::camera::{ColorImage, DepthImage};
 
 /// Layout of a depth frame.
@@ -71,10 +71,7 @@ impl ColorCodec {
             }
             Self::Yuy2 => {
                 expect_bytes(bytes, 2 * pixels)?;
-                let pairs = bytes.as_chunks::<4>().0.iter();
-                pairs
-                    .flat_map(|[y0, u, y1, v]| [rgb(*y0, *u, *v), rgb(*y1, *u, *v)])
-                    .collect()
+                yuyv_to_rgb(bytes)
             }
             Self::Bgra => {
                 expect_bytes(bytes, 4 * pixels)?;
@@ -115,18 +112,14 @@ fn nv12(bytes: &[u8], width: usize, height: usize) -> Vec<[u8; 3]> {
         let chroma = &chroma[v / 2 * row..][..row];
         for u in 0..width {
             let pair = u / 2 * 2;
-            out.push(rgb(luma[v * width + u], chroma[pair], chroma[pair + 1]));
+            out.push(yuv_to_rgb(
+                luma[v * width + u],
+                chroma[pair],
+                chroma[pair + 1],
+            ));
         }
     }
     out
-}
-
-/// RGB of video-range luma and chroma (ITU-R BT.601, as the device's own library converts it).
-fn rgb(y: u8, u: u8, v: u8) -> [u8; 3] {
-    let y = 1.164 * (f32::from(y) - 16.0);
-    let (u, v) = (f32::from(u) - 128.0, f32::from(v) - 128.0);
-    [y + 1.596 * v, y - 0.392 * u - 0.813 * v, y + 2.017 * u]
-        .map(|x| x.round().clamp(0.0, 255.0) as u8)
 }
 
 #[cfg(test)]

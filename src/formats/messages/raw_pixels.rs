@@ -2,7 +2,7 @@
 
 use super::fault::MessageFault;
 use super::image_layout::{ImageLayout, PixelContent, millimetres};
-use crate::image::check_size;
+use crate::image::{check_size, yuv_to_rgb};
 use crate::rgbd_folder::depth_to_mm;
 use std::path::Path;
 use tryon_geometry::camera::{ColorImage, DepthImage, ImageError};
@@ -172,7 +172,7 @@ pub(super) fn color(layout: &ImageLayout, data: &[u8]) -> Result<ColorImage, Mes
             }
             PixelFormat::Yuv422 { y, u, v } => {
                 let pairs = row.as_chunks::<4>().0.iter();
-                let pixels = pairs.flat_map(|p| y.map(|y| rgb_of_yuv(p[y], p[u], p[v])));
+                let pixels = pairs.flat_map(|p| y.map(|y| yuv_to_rgb(p[y], p[u], p[v])));
                 out.extend(pixels.take(width as usize).flatten());
             }
             _ => {
@@ -182,18 +182,6 @@ pub(super) fn color(layout: &ImageLayout, data: &[u8]) -> Result<ColorImage, Mes
         }
     }
     ColorImage::new(width, height, out).map_err(size_fault)
-}
-
-/// RGB of a pixel with ITU-R BT.601 luminance of 16 to 235, as cameras and OpenCV have it.
-fn rgb_of_yuv(y: u8, u: u8, v: u8) -> [u8; 3] {
-    let y = 255.0 / 219.0 * (f32::from(y) - 16.0);
-    let [u, v] = [u, v].map(|c| 255.0 / 224.0 * (f32::from(c) - 128.0));
-    let rgb = [
-        y + 1.402 * v,
-        y - 0.344_136 * u - 0.714_136 * v,
-        y + 1.772 * u,
-    ];
-    rgb.map(|c| c.round().clamp(0.0, 255.0) as u8)
 }
 
 #[cfg(test)]
@@ -238,11 +226,11 @@ mod tests {
             ("yuyv", [81, 90, 81, 240]),
         ] {
             let image = color(&raw(encoding, 1, 4), &data).expect("decodes");
-            assert_eq!(image.data(), rgb_of_yuv(red[0], red[1], red[2]));
+            assert_eq!(image.data(), yuv_to_rgb(red[0], red[1], red[2]));
             assert!(image.data()[0] > 250 && image.data()[1] < 5 && image.data()[2] < 5);
         }
-        assert_eq!(rgb_of_yuv(16, 128, 128), [0; 3]);
-        assert_eq!(rgb_of_yuv(235, 128, 128), [255; 3]);
+        assert_eq!(yuv_to_rgb(16, 128, 128), [0; 3]);
+        assert_eq!(yuv_to_rgb(235, 128, 128), [255; 3]);
     }
 
     #[test]

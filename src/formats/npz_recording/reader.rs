@@ -35,6 +35,15 @@ pub struct NpzReader {
 }
 
 impl NpzReader {
+    /// True for an archive with an array of `depth`: others have bodies and motions in npz.
+    ///
+    /// # Errors
+    /// When the file cannot be read or is no zip archive.
+    pub fn is_recording(path: &Path) -> Result<bool, FormatError> {
+        let zip = open_zip(path)?;
+        Ok(zip.file_names().any(|name| name == "depth.npy"))
+    }
+
     /// Opens the arrays and checks the first frame. `camera` is a `camera.json` for a file without `K`.
     ///
     /// # Errors

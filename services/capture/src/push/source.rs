@@ -4,7 +4,7 @@ use super::description::Description;
 use super::newest::Newest;
 use std::path::PathBuf;
 use std::sync::Arc;
-use tryon_formats::image::decode_color;
+use tryon_formats::image::{decode_color, yuyv_to_rgb};
 use tryon_formats::{FormatError, RgbdSource, depth_to_mm};
 use tryon_geometry::camera::{
     Calibration, ColorImage, DepthImage, ImageError, LensCalibration, RgbdFrame,
@@ -63,7 +63,7 @@ impl PushSource {
                 let pixels = frame.color.as_chunks::<3>().0.iter();
                 pixels.flat_map(|[b, g, r]| [*r, *g, *b]).collect()
             }
-            ColorEncoding::Yuyv => yuyv_to_rgb(&frame.color),
+            ColorEncoding::Yuyv => yuyv_to_rgb(&frame.color).into_flattened(),
         };
         let image = ColorImage::new(k.width, k.height, bytes);
         image
@@ -108,23 +108,4 @@ impl RgbdSource for PushSource {
     fn rewind(&mut self) -> Result<(), FormatError> {
         Ok(())
     }
-}
-
-/// RGB of YUYV pixels (BT.601, full range), two a quadruple.
-fn yuyv_to_rgb(bytes: &[u8]) -> Vec<u8> {
-    let pair = |[y0, u, y1, v]: &[u8; 4]| {
-        let (u, v) = (f32::from(*u) - 128.0, f32::from(*v) - 128.0);
-        let rgb = |y: u8| {
-            let y = f32::from(y);
-            [
-                y + 1.402 * v,
-                y - 0.344_136 * u - 0.714_136 * v,
-                y + 1.772 * u,
-            ]
-            .map(|c| c.round() as u8)
-        };
-        [rgb(*y0), rgb(*y1)]
-    };
-    let pairs = bytes.as_chunks::<4>().0.iter();
-    pairs.flat_map(pair).flatten().collect()
 }

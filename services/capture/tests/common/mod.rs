@@ -1,5 +1,4 @@
 //! The service as a process, and its client.
-#![allow(dead_code, reason = "each test file uses its share")]
 
 use std::io::{BufRead, BufReader};
 use std::path::Path;
@@ -8,7 +7,7 @@ use tryon_proto::v1::capture_service_client::CaptureServiceClient;
 use tryon_proto::v1::{CameraInfo, HoldConsentRequest, ListCamerasRequest};
 
 /// Ends the process whatever the test does.
-pub struct Process(Child);
+pub(crate) struct Process(Child);
 
 impl Drop for Process {
     fn drop(&mut self) {
@@ -17,10 +16,10 @@ impl Drop for Process {
     }
 }
 
-pub type Client = CaptureServiceClient<tonic::transport::Channel>;
+pub(crate) type Client = CaptureServiceClient<tonic::transport::Channel>;
 
 /// The service after a line of shell, with a source for camera `front`; its gRPC URL. Recordings go into `folder`.
-pub fn start(folder: &Path, before: &str, source: &str) -> (Process, String) {
+pub(crate) fn start(folder: &Path, before: &str, source: &str) -> (Process, String) {
     let set = [
         "capture.address=127.0.0.1:0".to_owned(),
         "capture.admin=127.0.0.1:0".to_owned(),
@@ -49,14 +48,14 @@ pub fn start(folder: &Path, before: &str, source: &str) -> (Process, String) {
     (process, format!("http://{address}"))
 }
 
-pub async fn camera(client: &mut Client) -> CameraInfo {
+pub(crate) async fn camera(client: &mut Client) -> CameraInfo {
     let list = client.list_cameras(ListCamerasRequest::default()).await;
     let cameras = list.expect("listed").into_inner().cameras;
     cameras.into_iter().next().expect("one camera")
 }
 
 /// Lets the camera publish for the next seconds.
-pub async fn hold(client: &mut Client) {
+pub(crate) async fn hold(client: &mut Client) {
     let request = HoldConsentRequest {
         camera: "front".into(),
         try_on_id: "somebody".into(),

@@ -6,7 +6,7 @@ use super::{
 };
 use crate::args::ImportArgs;
 use crate::input;
-use anyhow::{Context, Result, bail};
+use anyhow::{Context, Result, bail, ensure};
 use std::path::Path;
 use std::process::ExitCode;
 use tryon::cloth::BendingResolution;
@@ -14,8 +14,8 @@ use tryon::formats::fabric_json::parse_fabric;
 use tryon::formats::gltf::{GlbMesh, read_glb};
 use tryon::formats::mhclo::read_mhclo;
 use tryon::formats::obj::read_obj;
-use tryon::formats::open_recording;
 use tryon::formats::sewn_obj::read_sewn_obj;
+use tryon::formats::{NpzReader, RECORDING_EXTENSIONS};
 use tryon::garment::import::from_mesh;
 use tryon::garment::{GarmentKind, GarmentMesh, Material, Triangulation};
 use tryon::geometry::math::P3;
@@ -31,7 +31,7 @@ const GREY: [u8; 3] = [180, 180, 180];
 pub(crate) fn run(args: &ImportArgs) -> Result<ExitCode> {
     let path = &args.input;
     match path.extension().and_then(|e| e.to_str()).unwrap_or("") {
-        "npz" => body(args)?,
+        "npz" if !NpzReader::is_recording(path)? => body(args)?,
         "obj" => obj(args)?,
         "glb" | "gltf" => {
             let g = read_glb(path)?;
@@ -40,10 +40,11 @@ pub(crate) fn run(args: &ImportArgs) -> Result<ExitCode> {
         }
         "json" => json(args)?,
         "mhclo" => clothes(args)?,
-        "mcap" | "mkv" | "r3d" | "" => recording(args)?,
+        e if e.is_empty() || RECORDING_EXTENSIONS.contains(&e) => recording(args)?,
         other => bail!(
-            "{}: .{other} is not known; bodies are .npz, garments .obj, .glb or .json, recordings .mcap, .mkv, .r3d or a folder",
-            path.display()
+            "{}: .{other} is not known; bodies are .npz, garments .obj, .glb or .json, recordings a folder or one of .{}",
+            path.display(),
+            RECORDING_EXTENSIONS.join(", .")
         ),
     }
     Ok(ExitCode::SUCCESS)
@@ -203,7 +204,7 @@ fn json(args: &ImportArgs) -> Result<()> {
 }
 
 fn recording(args: &ImportArgs) -> Result<()> {
-    let mut source = open_recording(&args.input)?;
+    let mut source = args.recording.open(&args.input)?;
     let mut sink = args
         .out
         .as_ref()
@@ -236,6 +237,12 @@ fn recording(args: &ImportArgs) -> Result<()> {
         bar.position(),
         k.width,
         k.height
+    );
+    let frames = bar.position();
+    ensure!(
+        bad < frames.max(1),
+        "{}: no frame is readable",
+        args.input.display()
     );
     Ok(())
 }

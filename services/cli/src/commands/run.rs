@@ -10,8 +10,8 @@ use serde::Serialize;
 use std::collections::BTreeMap;
 use std::process::ExitCode;
 use tryon::cloth::BendingResolution;
+use tryon::formats::RgbdSource;
 use tryon::formats::image::write_png_rgb;
-use tryon::formats::{RgbdSource, open_recording};
 use tryon::geometry::par::with_threads;
 use tryon::mirror::{Mirror, MirrorFrame};
 use tryon::tracking::{LostReason, Status};
@@ -146,7 +146,7 @@ pub(crate) fn run(args: &RunArgs) -> Result<ExitCode> {
     }
     ensure!(args.fine.still.is_none(), "--still needs --solver offline");
     let choices = input::choices(&args.garments, &args.given())?;
-    let source = open_recording(&args.input)?;
+    let source = args.recording.open(&args.input)?;
     let template = input::template(args.body.as_deref())?;
     input::create_dir(&args.out)?;
     let mut mirror = Mirror::new(template, source.calibration(), choices);

@@ -9,9 +9,9 @@ use std::collections::BTreeMap;
 use std::io::{BufWriter, Write};
 use std::process::ExitCode;
 use tryon::body::BoneTransforms;
+use tryon::formats::RgbdSource;
 use tryon::formats::image::write_png_rgb;
 use tryon::formats::obj::write_obj;
-use tryon::formats::{RgbdSource, open_recording};
 use tryon::geometry::camera::{ColorImage, RgbdFrame};
 use tryon::geometry::par::with_threads;
 use tryon::tracking::{
@@ -23,7 +23,7 @@ use tryon::tracking::{
 /// # Errors
 /// Bad input, named; or results that cannot be written.
 pub(crate) fn run(args: &TrackArgs) -> Result<ExitCode> {
-    let mut source = open_recording(&args.input)?;
+    let mut source = args.recording.open(&args.input)?;
     let template = input::template(args.body.as_deref())?;
     let model = TrackerModel::new(
         template,
