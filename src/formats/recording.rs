@@ -55,11 +55,20 @@ pub fn open_recording_with(
     path: &Path,
     options: &RecordingOptions,
 ) -> Result<Box<dyn RgbdSource>, FormatError> {
-    Ok(Rectified::wrap(path, open_raw(path, options)?))
+    Ok(Rectified::wrap(path, open_as_recorded_with(path, options)?))
 }
 
-/// Opens a recording, lens distortion included.
-fn open_raw(path: &Path, options: &RecordingOptions) -> Result<Box<dyn RgbdSource>, FormatError> {
+/// As [`open_recording`], lens distortion included.
+#[cfg(test)]
+pub(crate) fn open_as_recorded(path: &Path) -> Result<Box<dyn RgbdSource>, FormatError> {
+    open_as_recorded_with(path, &RecordingOptions::default())
+}
+
+/// As [`open_recording_with`], lens distortion included.
+pub(crate) fn open_as_recorded_with(
+    path: &Path,
+    options: &RecordingOptions,
+) -> Result<Box<dyn RgbdSource>, FormatError> {
     let kind = std::fs::metadata(path).map_err(|e| FormatError::io(path, e))?;
     let camera = options.camera.as_deref();
     let messages = |open: OpenContainer| -> Result<Box<dyn RgbdSource>, FormatError> {

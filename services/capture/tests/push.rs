@@ -127,6 +127,16 @@ async fn frames_arrive_as_they_were_sent_and_only_while_somebody_may_see_them() 
         .into_inner();
     assert_eq!((end.frames, end.dropped), (5, 0));
 
+    let Sender {
+        requests,
+        mut answers,
+    } = sender;
+    drop(requests);
+    assert!(
+        answers.message().await.expect("no fault").is_none(),
+        "the call ends"
+    );
+
     let path = folder.path().join(begun.into_inner().file);
     let mut recording = open_recording(&path).expect("readable");
     let first = recording.next_frame().expect("whole").expect("a frame");

@@ -292,7 +292,7 @@ fn a_recording_of_a_device_reads() {
     let Some(path) = crate::shared_data("rgbd/k4a_recording/recording.mkv") else {
         return;
     };
-    let mut reader = crate::open_recording(&path).expect("opens");
+    let mut reader = crate::recording::open_as_recorded(&path).expect("opens");
     let lenses = reader.lenses();
     let k = lenses.depth.intrinsics;
     let near = |a: f64, b: f64| (a - b).abs() < 1e-6;

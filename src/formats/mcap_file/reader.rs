@@ -138,7 +138,11 @@ impl McapMessages {
                 file.seek(SeekFrom::Start(start))?;
                 let bytes =
                     BufReader::with_capacity(buffer_size(prefix.length), file).take(prefix.length);
-                self.chunk = Some(chunk::records(bytes, prefix.length)?);
+                self.chunk = match chunk::records(bytes, prefix.length) {
+                    // Writers state the lengths of a chunk once it is whole.
+                    Err(_) if self.next > self.length => return Err(end()),
+                    records => Some(records?),
+                };
                 return Ok(McapStep::Other);
             }
             op::SCHEMA | op::CHANNEL | op::MESSAGE => {}

@@ -100,6 +100,28 @@ fn registered_colour_has_one_calibration_and_rewind_restarts() {
     assert!(r.next_frame().expect("reads").is_some() && r.next_frame().expect("ends").is_none());
 }
 
+/// A writer states the lengths of a chunk when it is whole: on a full disk they stay unknown.
+#[test]
+fn a_chunk_that_was_never_finished_ends_the_file() {
+    let dir = tempfile::tempdir().expect("temporary folder");
+    let frames: Vec<RgbdFrame> = (0..3).map(|i| frame(i, true)).collect();
+    let path = written(dir.path(), &Calibration::registered(TINY), &frames);
+    let mut bytes = fs::read(&path).expect("read");
+    let data_end = bytes
+        .windows(9)
+        .rposition(|w| w[0] == 0x0f && w[1..] == 4u64.to_le_bytes());
+    bytes.truncate(data_end.expect("the end of the data"));
+    bytes.push(0x06);
+    bytes.extend([0xff; 8]);
+    bytes.extend([0; 28]);
+    bytes.extend(3u32.to_le_bytes());
+    bytes.extend(*b"lz4");
+    bytes.extend([0xff; 8]);
+    bytes.extend([1; 100]);
+    fs::write(&path, bytes).expect("written");
+    assert_eq!(all(open_recording(&path).expect("opens")).len(), 3);
+}
+
 #[test]
 fn a_truncated_file_keeps_all_whole_frames() {
     let dir = tempfile::tempdir().expect("temporary folder");

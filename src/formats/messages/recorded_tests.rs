@@ -1,7 +1,8 @@
 //! Recordings by the writers of the trade (`testdata/recordings/make_recordings.py`) against what the same libraries read,
 //! and the same files damaged.
 
-use crate::{FormatError, RecordingOptions, open_recording, open_recording_with};
+use crate::recording::{open_as_recorded, open_as_recorded_with};
+use crate::{FormatError, RecordingOptions};
 use nalgebra::Vector3;
 use serde_json::Value;
 use std::fs;
@@ -62,7 +63,7 @@ fn check_lens(lens: &Lens, want: &Value, name: &str) {
 fn pixels_times_and_cameras_are_those_that_other_libraries_read() {
     let expected = expected();
     for name in FILES {
-        let mut source = open_recording(&recording(name)).unwrap_or_else(|e| panic!("{e}"));
+        let mut source = open_as_recorded(&recording(name)).unwrap_or_else(|e| panic!("{e}"));
         let want = &expected[name];
         let frames = want["frames"].as_array().expect("frames");
         for round in 0..2 {
@@ -101,7 +102,7 @@ fn transforms_place_the_color_camera() {
         ("ros2_mcap", ros),
         ("realsense.bag", sdk),
     ] {
-        let source = open_recording(&recording(name)).expect("opens");
+        let source = open_as_recorded(&recording(name)).expect("opens");
         let pose = *source.lenses().color_from_depth.iso();
         let off = (pose.translation.vector - want).norm();
         assert!(
@@ -113,7 +114,7 @@ fn transforms_place_the_color_camera() {
 
 #[test]
 fn other_topics_are_named_and_infrared_is_choosable() {
-    let source = open_recording(&recording("ros2_mcap")).expect("opens");
+    let source = open_as_recorded(&recording("ros2_mcap")).expect("opens");
     let notes = source.untaken();
     assert_eq!(notes.len(), 2, "{notes:?}");
     assert!(notes[0].contains("`/cam/infra1/image_raw` (mono8 12×9): infrared"));
@@ -124,7 +125,7 @@ fn other_topics_are_named_and_infrared_is_choosable() {
         ..RecordingOptions::default()
     };
     let path = recording("ros1_lz4.bag");
-    let mut source = open_recording_with(&path, &options).expect("opens");
+    let mut source = open_as_recorded_with(&path, &options).expect("opens");
     assert_eq!(source.calibration().color, None, "registered to depth");
     let frame = source.next_frame().expect("reads").expect("a frame");
     assert!(
@@ -135,7 +136,7 @@ fn other_topics_are_named_and_infrared_is_choosable() {
     let notes = source.untaken().join("\n");
     assert!(notes.contains("`/cam/color/image_raw`"), "{notes}");
 
-    let source = open_recording(&recording("realsense.bag")).expect("opens");
+    let source = open_as_recorded(&recording("realsense.bag")).expect("opens");
     let notes = source.untaken().join("\n");
     assert!(notes.contains("16-bit grey is taken as depth"), "{notes}");
 }
@@ -187,7 +188,7 @@ impl DamagedCopy {
         bytes: &[u8],
     ) -> Result<Vec<Result<RgbdFrame, FormatError>>, FormatError> {
         fs::write(&self.file, bytes).expect("written");
-        let mut source = open_recording(&self.folder.path().join(name))?;
+        let mut source = open_as_recorded(&self.folder.path().join(name))?;
         let mut frames = Vec::new();
         for _ in 0..1000 {
             match source.next_frame() {

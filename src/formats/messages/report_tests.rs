@@ -1,6 +1,7 @@
 //! Recordings as others write them (`shared/data/reports`), each with its right value.
 
-use crate::{RecordingOptions, RgbdSource, open_recording, open_recording_with, shared_data};
+use crate::recording::{open_as_recorded, open_as_recorded_with};
+use crate::{RecordingOptions, RgbdSource, shared_data};
 use tryon_geometry::camera::RgbdFrame;
 
 fn frames(source: &mut dyn RgbdSource) -> Vec<RgbdFrame> {
@@ -9,7 +10,7 @@ fn frames(source: &mut dyn RgbdSource) -> Vec<RgbdFrame> {
 
 fn report(file: &str) -> Option<(Box<dyn RgbdSource>, Vec<RgbdFrame>)> {
     let path = shared_data(format!("reports/{file}"))?;
-    let mut source = open_recording(&path).expect("opens");
+    let mut source = open_as_recorded(&path).expect("opens");
     let frames = frames(&mut *source);
     Some((source, frames))
 }
@@ -75,7 +76,7 @@ fn a_wished_topic_that_is_missing_lists_the_others() {
         depth_topic: Some("/no".into()),
         ..RecordingOptions::default()
     };
-    let opened = open_recording_with(&path, &options).map(|_| "opened");
+    let opened = open_as_recorded_with(&path, &options).map(|_| "opened");
     let e = opened.expect_err("no such topic").to_string();
     assert!(
         e.contains("`/no`") && e.contains("`/depth` (16UC1 64×48)"),

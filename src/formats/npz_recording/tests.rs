@@ -1,5 +1,6 @@
 use super::*;
-use crate::{FormatError, RecordingOptions, RgbdSource, open_recording, open_recording_with};
+use crate::recording::{open_as_recorded, open_as_recorded_with};
+use crate::{FormatError, RecordingOptions, RgbdSource};
 use proptest::prelude::*;
 use std::fs;
 use std::io::Write;
@@ -72,7 +73,7 @@ fn frames_stream_from_stored_and_deflated_arrays() {
             ("depth", depth()),
         ];
         let (dir, _) = open_bytes(&archive(&arrays, is_deflated));
-        let mut source = open_recording(&dir.path().join("a.npz")).expect("opens");
+        let mut source = open_as_recorded(&dir.path().join("a.npz")).expect("opens");
         assert_eq!(
             (source.len(), source.untaken()),
             (Some(2), &["poses: array is not used".to_owned()][..])
@@ -179,10 +180,10 @@ fn a_camera_file_stands_in_for_k() {
         ..RecordingOptions::default()
     };
     let path = dir.path().join("a.npz");
-    let source = open_recording_with(&path, &options).expect("opens");
+    let source = open_as_recorded_with(&path, &options).expect("opens");
     assert_eq!(source.lenses().depth.distortion.radial[0], 0.1);
     fs::write(&camera, text.replace("\"width\": 3", "\"width\": 4")).expect("written");
-    let e = open_recording_with(&path, &options)
+    let e = open_as_recorded_with(&path, &options)
         .err()
         .expect("another size");
     assert!(

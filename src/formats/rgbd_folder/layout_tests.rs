@@ -1,8 +1,9 @@
 //! Folders as other programs lay them out.
 
 use super::*;
+use crate::RecordingOptions;
 use crate::image::{write_png_depth, write_png_rgb};
-use crate::{RecordingOptions, open_recording, open_recording_with};
+use crate::recording::{open_as_recorded, open_as_recorded_with};
 use proptest::prelude::*;
 use std::fs;
 use std::path::Path;
@@ -31,7 +32,7 @@ fn folder(camera: &str) -> tempfile::TempDir {
 
 /// First depth value and first colour of each frame.
 fn values(folder: &Path) -> Vec<(u16, Option<u8>)> {
-    let mut source = open_recording(folder).expect("opens");
+    let mut source = open_as_recorded(folder).expect("opens");
     let frames = std::iter::from_fn(|| source.next_frame().expect("reads"));
     let value = |c: ColorImage| c.data()[0];
     frames
@@ -40,7 +41,7 @@ fn values(folder: &Path) -> Vec<(u16, Option<u8>)> {
 }
 
 fn refusal(folder: &Path) -> String {
-    open_recording(folder)
+    open_as_recorded(folder)
         .err()
         .expect("must be refused")
         .to_string()
@@ -85,7 +86,7 @@ fn colour_that_nothing_pairs_is_named() {
     depth(dir.path(), "a.png", 1);
     depth(dir.path(), "b.png", 2);
     color(dir.path(), "rgb/x.png", (4, 3), 7);
-    let source = open_recording(dir.path()).expect("opens");
+    let source = open_as_recorded(dir.path()).expect("opens");
     let notes = source.untaken().join("\n");
     assert!(
         notes.contains("rgb: 1 colour images are left out"),
@@ -121,7 +122,7 @@ fn distortion_is_stated_for_both_cameras() {
         "color": {"width": 8, "height": 6, "fx": 9, "fy": 9, "cx": 4, "cy": 3, "distortion": [0, 0, 0, 0, 0, 0.4, 0, 0]}}"#;
     let dir = folder(&CAMERA.replace('}', color_camera));
     depth(dir.path(), "0.png", 1000);
-    let lenses = open_recording(dir.path()).expect("opens").lenses();
+    let lenses = open_as_recorded(dir.path()).expect("opens").lenses();
     assert_eq!(
         lenses.depth.distortion.radial,
         [0.1, -0.2, 0.3, 0.0, 0.0, 0.0]
@@ -166,14 +167,14 @@ fn cameras_come_from_the_folder_the_option_or_the_name() {
         ..RecordingOptions::default()
     };
     fs::write(root.path().join("own.json"), CAMERA).expect("written");
-    let source = open_recording_with(&nameless, &options).expect("opens");
+    let source = open_as_recorded_with(&nameless, &options).expect("opens");
     assert_eq!(source.calibration().depth.fx, 5.0);
     fs::write(
         nameless.join("camera.json"),
         CAMERA.replace("\"fx\": 5", "\"fx\": 6"),
     )
     .expect("written");
-    let source = open_recording_with(&nameless, &options).expect("opens");
+    let source = open_as_recorded_with(&nameless, &options).expect("opens");
     assert_eq!(source.calibration().depth.fx, 6.0);
     assert!(source.untaken()[0].contains("its own camera.json"));
 
@@ -181,7 +182,7 @@ fn cameras_come_from_the_folder_the_option_or_the_name() {
     fs::create_dir_all(tum.join("depth")).expect("created");
     let image = DepthImage::new(640, 480, vec![5000; 640 * 480]).expect("sizes");
     write_png_depth(&tum.join("depth/1305031102.160407.png"), &image).expect("written");
-    let mut source = open_recording(&tum).expect("opens");
+    let mut source = open_as_recorded(&tum).expect("opens");
     assert_eq!(source.lenses().depth.distortion.radial[0], 0.262_383);
     let frame = source.next_frame().expect("reads").expect("a frame");
     assert_eq!(
@@ -208,7 +209,7 @@ proptest! {
             bytes[at] = value;
         }
         fs::write(dir.path().join(name), bytes).expect("written");
-        if let Ok(mut source) = open_recording(dir.path()) {
+        if let Ok(mut source) = open_as_recorded(dir.path()) {
             while !matches!(source.next_frame(), Ok(None)) {}
         }
     }

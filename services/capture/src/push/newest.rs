@@ -9,9 +9,10 @@ use tryon_proto::v1::{CameraFrame, FrameOutcome, PublishFramesResponse};
 /// Answers to a sender.
 pub(super) type Answers = Sender<Result<PublishFramesResponse, Status>>;
 
-#[derive(Default)]
 struct State {
     waiting: Option<CameraFrame>,
+    /// Dropped on closing: the call ends with the last holder.
+    answers: Option<Answers>,
     /// Frames replaced by newer ones.
     replaced: u64,
 }
@@ -20,16 +21,18 @@ struct State {
 pub(crate) struct Newest {
     state: Mutex<State>,
     changed: Condvar,
-    answers: Answers,
     closed: CancellationToken,
 }
 
 impl Newest {
     pub(super) fn new(answers: Answers) -> Self {
         Self {
-            state: Mutex::default(),
+            state: Mutex::new(State {
+                waiting: None,
+                answers: Some(answers),
+                replaced: 0,
+            }),
             changed: Condvar::new(),
-            answers,
             closed: CancellationToken::new(),
         }
     }
@@ -65,20 +68,23 @@ impl Newest {
 
     /// Answers a frame. A sender that reads no answers gets no more than wait for it.
     pub(super) fn answer(&self, number: u64, outcome: FrameOutcome, detail: String) {
-        let replaced = self.state().replaced;
-        let _ = self.answers.try_send(Ok(PublishFramesResponse {
-            number,
-            outcome: outcome.into(),
-            detail,
-            replaced,
-        }));
+        let state = self.state();
+        if let Some(answers) = &state.answers {
+            let _ = answers.try_send(Ok(PublishFramesResponse {
+                number,
+                outcome: outcome.into(),
+                detail,
+                replaced: state.replaced,
+            }));
+        }
     }
 
     /// Takes and gives no more frames.
     pub(crate) fn close(&self) {
-        let held = self.state();
+        let mut state = self.state();
+        (state.waiting, state.answers) = (None, None);
         self.closed.cancel();
-        drop(held);
+        drop(state);
         self.changed.notify_all();
     }
 
