@@ -47,7 +47,7 @@ impl Registration {
         }
     }
 
-    /// Draws depth [mm] into the colour view: `out` takes the colour camera's size, with depth along its axis, 0 where the
+    /// Draws depth \[mm\] into the colour view: `out` takes the colour camera's size, with depth along its axis, 0 where the
     /// depth camera reads nothing.
     ///
     /// # Errors

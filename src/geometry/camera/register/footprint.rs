@@ -16,7 +16,7 @@ const ROUND: f32 = 12_582_912.0;
 /// Value of colour pixels without reading during the z-test.
 pub(super) const EMPTY: u16 = u16::MAX;
 
-/// A depth pixel in the colour view: column, row [pixels] and depth [mm].
+/// A depth pixel in the colour view: column, row [pixels] and depth \[mm\].
 type Point = [f32; 3];
 
 /// Constants of all footprints of a pair of cameras.
@@ -53,9 +53,9 @@ pub(super) struct Footprint {
     /// Behind the last column and row.
     pub(super) end: [f32; 2],
     center: Point,
-    /// Change of depth by column and row [mm].
+    /// Change of depth by column and row \[mm\].
     slope: [f32; 2],
-    /// Largest difference from the depth of the centre [mm].
+    /// Largest difference from the depth of the centre \[mm\].
     range: f32,
 }
 
@@ -150,14 +150,14 @@ impl FootprintModel {
 }
 
 impl Footprint {
-    /// Depth at a colour pixel [mm].
+    /// Depth at a colour pixel \[mm\].
     #[inline(always)]
     pub(super) fn depth(&self, [x, y]: [f32; 2]) -> u16 {
         let [u, v, _] = self.center;
         self.limited(self.slope[0] * (x - u) + self.slope[1] * (y - v))
     }
 
-    /// Depth of the centre and a change [mm].
+    /// Depth of the centre and a change \[mm\].
     #[inline(always)]
     fn limited(&self, change: f32) -> u16 {
         whole(self.center[2] + clamp(change, [-self.range, self.range])) as u16
@@ -222,7 +222,7 @@ fn step([before, center, after]: [Point; 3], default: [f32; 2]) -> Point {
     [change(0, default[0]), change(1, default[1]), change(2, 0.0)]
 }
 
-/// Change of depth by colour column and row, from two steps on a surface [mm]; none where it is seen from the side.
+/// Change of depth by colour column and row, from two steps on a surface \[mm\]; none where it is seen from the side.
 #[inline(always)]
 fn slope(across: Point, down: Point) -> [f32; 2] {
     let area = across[0] * down[1] - down[0] * across[1];

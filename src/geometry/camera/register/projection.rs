@@ -5,9 +5,9 @@ use nalgebra::Vector3;
 
 /// Pixels of a row that are computed together: local arrays of this length become vector registers.
 pub(super) const BLOCK: usize = 32;
-/// Nearest point of the colour camera that is drawn [mm].
+/// Nearest point of the colour camera that is drawn \[mm\].
 const NEAR: f32 = 50.0;
-/// Farthest one [mm]: 65535 is the empty value of the z-test.
+/// Farthest one \[mm\]: 65535 is the empty value of the z-test.
 const FAR: f32 = 65_534.0;
 /// Columns and rows around the colour image within which points still count as neighbours [pixels].
 const MARGIN: f32 = 8.0;
@@ -17,8 +17,8 @@ const NO_RAY: [f32; 3] = [0.0, 0.0, f32::NEG_INFINITY];
 /// One number for each pixel of a block.
 pub(super) type Lanes = [f32; BLOCK];
 
-/// Affine map from depth z [mm] to homogeneous colour pixels: (u w, v w, w) = z · ray + origin, with w the depth along the
-/// colour camera's axis [mm].
+/// Affine map from depth z \[mm\] to homogeneous colour pixels: (u w, v w, w) = z · ray + origin, with w the depth along the
+/// colour camera's axis \[mm\].
 #[derive(Clone, Debug)]
 pub(super) struct Projection {
     /// Rays of the depth pixels, row by row, the last block of a row filled up; twelve bytes a pixel.
@@ -90,7 +90,7 @@ impl Projection {
         }
     }
 
-    /// Projects row `v` of a depth image [mm].
+    /// Projects row `v` of a depth image \[mm\].
     #[inline(always)]
     pub(super) fn row(&self, v: usize, depth: &[u16], out: &mut ProjectedRow) {
         let blocks = self.width.div_ceil(BLOCK);
