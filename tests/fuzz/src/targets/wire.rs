@@ -116,6 +116,7 @@ requests!(
     FollowSimulationRequest,
     CancelSimulationRequest,
     HoldConsentRequest,
+    PublishFramesRequest,
     WithdrawConsentRequest,
     AcknowledgeFramesRequest,
     OfferPhotoRequest,
