@@ -3,6 +3,13 @@
 use super::FormatError;
 use tryon_geometry::camera::{Calibration, LensCalibration, RgbdFrame};
 
+/// Largest time between colour and its depth, nanoseconds: half a period at 15 Hz, the slowest tracking rate. Older
+/// colour shows another pose.
+pub(crate) const MAX_COLOR_GAP_NS: u64 = 33_400_000;
+
+/// Frame period of recordings without times, nanoseconds: 30 Hz, that of most depth cameras.
+pub(crate) const NOMINAL_PERIOD_NS: u64 = 1_000_000_000 / 30;
+
 /// Frames of one camera, in capture order.
 pub trait RgbdSource: Send {
     /// Calibration of all frames.

@@ -3,7 +3,7 @@
 use super::record::{RecordFault, RecordHeader, field, op, read_data};
 use crate::FormatError;
 use crate::chunk_records::{ChunkCompression, ChunkRecords, buffer_size, skip_bytes};
-use crate::messages::{MAX_RECORD, MessageContainer, MessageHead, TopicChannel};
+use crate::messages::{ContainerStep, MAX_RECORD, MessageContainer, MessageHead, TopicChannel};
 use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::{BufReader, Read, Seek, SeekFrom};
@@ -29,16 +29,6 @@ pub(crate) struct BagMessages {
     messages: u64,
     is_ended: bool,
     is_cut_short: bool,
-}
-
-/// Step of reading.
-enum BagStep {
-    /// Message of a wanted channel.
-    Message(MessageHead),
-    /// Another record.
-    Other,
-    /// End of the chunk, or of the file.
-    End,
 }
 
 impl BagMessages {
@@ -72,11 +62,11 @@ impl BagMessages {
         }))
     }
 
-    fn step(
+    fn read_step(
         &mut self,
         is_wanted: &dyn Fn(&TopicChannel) -> bool,
         data: &mut Vec<u8>,
-    ) -> Result<BagStep, RecordFault> {
+    ) -> Result<ContainerStep, RecordFault> {
         let Some(mut chunk) = self.chunk.take() else {
             return self.file_record(is_wanted, data);
         };
@@ -84,7 +74,7 @@ impl BagMessages {
         let step = match RecordHeader::read(&mut chunk) {
             Ok(None) => {
                 self.file.seek(SeekFrom::Start(self.next))?;
-                return Ok(BagStep::Other);
+                return Ok(ContainerStep::Other);
             }
             Ok(Some(header)) => self.record(&header, &mut chunk, is_wanted, data),
             Err(fault) => Err(fault),
@@ -103,18 +93,18 @@ impl BagMessages {
         &mut self,
         is_wanted: &dyn Fn(&TopicChannel) -> bool,
         data: &mut Vec<u8>,
-    ) -> Result<BagStep, RecordFault> {
+    ) -> Result<ContainerStep, RecordFault> {
         if self.next > self.length {
             return Err(RecordFault::CutShort);
         }
         let Some(header) = RecordHeader::read(&mut self.file)? else {
-            return Ok(BagStep::End);
+            return Ok(ContainerStep::End);
         };
         let start = self.file.stream_position()?;
         self.next = start + header.data_length;
         if header.number("op")? == [op::CHUNK] {
             self.chunk = Some(self.open_chunk(&header, start)?);
-            return Ok(BagStep::Other);
+            return Ok(ContainerStep::Other);
         }
         let mut from = self.file.get_ref().try_clone()?;
         from.seek(SeekFrom::Start(start))?;
@@ -149,7 +139,7 @@ impl BagMessages {
         from: &mut dyn Read,
         is_wanted: &dyn Fn(&TopicChannel) -> bool,
         data: &mut Vec<u8>,
-    ) -> Result<BagStep, RecordFault> {
+    ) -> Result<ContainerStep, RecordFault> {
         let length = header.data_length;
         match header.number("op")? {
             [op::CONNECTION] => {
@@ -163,7 +153,7 @@ impl BagMessages {
                 if let Some(channel) = channel.filter(|c| is_wanted(c)) {
                     let [seconds, nanoseconds] = header.number::<8>("time").map(halves)?;
                     read_data(from, length, MAX_RECORD, data)?;
-                    return Ok(BagStep::Message(MessageHead {
+                    return Ok(ContainerStep::Message(MessageHead {
                         channel,
                         sequence: 0,
                         log_time_ns: seconds * 1_000_000_000 + nanoseconds,
@@ -174,7 +164,7 @@ impl BagMessages {
             }
             _ => skip_bytes(from, length)?,
         }
-        Ok(BagStep::Other)
+        Ok(ContainerStep::Other)
     }
 
     /// Adds the connection whose data are in the buffer.
@@ -218,20 +208,21 @@ fn halves(bytes: [u8; 8]) -> [u64; 2] {
 }
 
 impl MessageContainer for BagMessages {
-    fn next_message(
+    fn step(
         &mut self,
         is_wanted: &dyn Fn(&TopicChannel) -> bool,
         data: &mut Vec<u8>,
-    ) -> Result<Option<MessageHead>, FormatError> {
-        while !self.is_ended {
-            match self.step(is_wanted, data) {
-                Ok(BagStep::Message(head)) => return Ok(Some(head)),
-                Ok(BagStep::Other) => {}
-                Ok(BagStep::End) => self.is_ended = true,
-                Err(fault) => self.end(fault)?,
-            }
+    ) -> Result<ContainerStep, FormatError> {
+        if self.is_ended {
+            return Ok(ContainerStep::End);
         }
-        Ok(None)
+        match self.read_step(is_wanted, data) {
+            Ok(step) => {
+                self.is_ended = matches!(step, ContainerStep::End);
+                Ok(step)
+            }
+            Err(fault) => self.end(fault).map(|()| ContainerStep::End),
+        }
     }
     fn channels(&self) -> Vec<Arc<TopicChannel>> {
         self.channels.values().cloned().collect()

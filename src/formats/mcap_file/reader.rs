@@ -4,7 +4,7 @@ use super::chunk::{self, McapFault};
 use super::record::{MESSAGE_HEADER, McapRecord};
 use crate::FormatError;
 use crate::chunk_records::{ChunkRecords, buffer_size, read_bytes, skip_bytes};
-use crate::messages::{MAX_RECORD, MessageContainer, MessageHead, TopicChannel};
+use crate::messages::{ContainerStep, MAX_RECORD, MessageContainer, MessageHead, TopicChannel};
 use mcap::records::op;
 use std::collections::BTreeMap;
 use std::fs::File;
@@ -29,16 +29,6 @@ pub(crate) struct McapMessages {
     messages: u64,
     is_ended: bool,
     is_cut_short: bool,
-}
-
-/// Step of reading.
-enum McapStep {
-    /// Message of a wanted channel.
-    Message(MessageHead),
-    /// Another record, or the end of a chunk.
-    Other,
-    /// End of the messages.
-    End,
 }
 
 /// Code and length of a record.
@@ -100,18 +90,18 @@ impl McapMessages {
         }))
     }
 
-    fn step(
+    fn read_step(
         &mut self,
         is_wanted: &dyn Fn(&TopicChannel) -> bool,
         data: &mut Vec<u8>,
-    ) -> Result<McapStep, McapFault> {
+    ) -> Result<ContainerStep, McapFault> {
         let Some(mut chunk) = self.chunk.take() else {
             return self.file_record(is_wanted, data);
         };
         let step = match RecordPrefix::read(&mut chunk) {
             Ok(None) => {
                 self.file.seek(SeekFrom::Start(self.next))?;
-                return Ok(McapStep::Other);
+                return Ok(ContainerStep::Other);
             }
             Ok(Some(prefix)) => self.record(prefix, &mut chunk, is_wanted, data),
             Err(fault) => Err(fault),
@@ -126,13 +116,13 @@ impl McapMessages {
         &mut self,
         is_wanted: &dyn Fn(&TopicChannel) -> bool,
         data: &mut Vec<u8>,
-    ) -> Result<McapStep, McapFault> {
+    ) -> Result<ContainerStep, McapFault> {
         let end = || McapFault::Io(ErrorKind::UnexpectedEof.into());
         let prefix = RecordPrefix::read(&mut self.file)?.ok_or_else(end)?;
         let start = self.file.stream_position()?;
         self.next = start.saturating_add(prefix.length);
         match prefix.opcode {
-            op::DATA_END | op::FOOTER => return Ok(McapStep::End),
+            op::DATA_END | op::FOOTER => return Ok(ContainerStep::End),
             op::CHUNK => {
                 let mut file = self.file.get_ref().try_clone()?;
                 file.seek(SeekFrom::Start(start))?;
@@ -143,13 +133,13 @@ impl McapMessages {
                     Err(_) if self.next > self.length => return Err(end()),
                     records => Some(records?),
                 };
-                return Ok(McapStep::Other);
+                return Ok(ContainerStep::Other);
             }
             op::SCHEMA | op::CHANNEL | op::MESSAGE => {}
             _ if self.next > self.length => return Err(end()),
             _ => {
                 self.file.seek(SeekFrom::Start(self.next))?;
-                return Ok(McapStep::Other);
+                return Ok(ContainerStep::Other);
             }
         }
         let mut from = self.file.get_ref().try_clone()?;
@@ -166,11 +156,11 @@ impl McapMessages {
         from: &mut dyn Read,
         is_wanted: &dyn Fn(&TopicChannel) -> bool,
         data: &mut Vec<u8>,
-    ) -> Result<McapStep, McapFault> {
+    ) -> Result<ContainerStep, McapFault> {
         let RecordPrefix { opcode, length } = prefix;
         if !matches!(opcode, op::SCHEMA | op::CHANNEL | op::MESSAGE) {
             skip_bytes(from, length)?;
-            return Ok(McapStep::Other);
+            return Ok(ContainerStep::Other);
         }
         if length > MAX_RECORD as u64 {
             let why = format!("{length} bytes, which exceeds limit of {MAX_RECORD}");
@@ -190,11 +180,11 @@ impl McapMessages {
         match head.filter(|head| is_wanted(&head.channel)) {
             Some(head) => {
                 read_bytes(from, length - header, data)?;
-                Ok(McapStep::Message(head))
+                Ok(ContainerStep::Message(head))
             }
             None => {
                 skip_bytes(from, length - header)?;
-                Ok(McapStep::Other)
+                Ok(ContainerStep::Other)
             }
         }
     }
@@ -258,20 +248,21 @@ impl McapMessages {
 }
 
 impl MessageContainer for McapMessages {
-    fn next_message(
+    fn step(
         &mut self,
         is_wanted: &dyn Fn(&TopicChannel) -> bool,
         data: &mut Vec<u8>,
-    ) -> Result<Option<MessageHead>, FormatError> {
-        while !self.is_ended {
-            match self.step(is_wanted, data) {
-                Ok(McapStep::Message(head)) => return Ok(Some(head)),
-                Ok(McapStep::Other) => {}
-                Ok(McapStep::End) => self.is_ended = true,
-                Err(fault) => self.end(fault)?,
-            }
+    ) -> Result<ContainerStep, FormatError> {
+        if self.is_ended {
+            return Ok(ContainerStep::End);
         }
-        Ok(None)
+        match self.read_step(is_wanted, data) {
+            Ok(step) => {
+                self.is_ended = matches!(step, ContainerStep::End);
+                Ok(step)
+            }
+            Err(fault) => self.end(fault).map(|()| ContainerStep::End),
+        }
     }
     fn channels(&self) -> Vec<Arc<TopicChannel>> {
         self.channels.values().cloned().collect()

@@ -77,17 +77,44 @@ impl MessageHead {
     }
 }
 
+/// Step of reading a file of messages.
+pub(crate) enum ContainerStep {
+    /// Message of a wanted channel; its bytes are read.
+    Message(MessageHead),
+    /// Another record, an unwanted message, or the end of a chunk.
+    Other,
+    /// End of the messages, from then on.
+    End,
+}
+
 /// File of recorded messages, read from start to end with memory for one message.
 pub(crate) trait MessageContainer: Send {
-    /// The next message whose channel is wanted; its bytes replace `data`. `None` at the end, also of a truncated file.
+    /// Reads a record. The bytes of a message whose channel is wanted replace `data`. A truncated file ends.
     ///
     /// # Errors
     /// A damaged record. The container is then at its end.
+    fn step(
+        &mut self,
+        is_wanted: &dyn Fn(&TopicChannel) -> bool,
+        data: &mut Vec<u8>,
+    ) -> Result<ContainerStep, FormatError>;
+    /// The next message whose channel is wanted; `None` at the end.
+    ///
+    /// # Errors
+    /// As [`Self::step`].
     fn next_message(
         &mut self,
         is_wanted: &dyn Fn(&TopicChannel) -> bool,
         data: &mut Vec<u8>,
-    ) -> Result<Option<MessageHead>, FormatError>;
+    ) -> Result<Option<MessageHead>, FormatError> {
+        loop {
+            match self.step(is_wanted, data)? {
+                ContainerStep::Message(head) => return Ok(Some(head)),
+                ContainerStep::Other => {}
+                ContainerStep::End => return Ok(None),
+            }
+        }
+    }
     /// Channels met so far.
     fn channels(&self) -> Vec<Arc<TopicChannel>>;
     /// True if the end that was reached lies within a record.

@@ -29,5 +29,7 @@ mod recorded_tests;
 #[cfg(test)]
 mod report_tests;
 
-pub(crate) use container::{MAX_RECORD, MessageContainer, MessageHead, TopicChannel};
+pub(crate) use container::{
+    ContainerStep, MAX_RECORD, MessageContainer, MessageHead, TopicChannel,
+};
 pub(crate) use source::{MessageSource, OpenContainer, StreamOptions};

@@ -3,8 +3,7 @@
 //! Each stream has a reader of its own, so their order in the file does not matter, and memory holds one item of the
 //! first stream and two of the second.
 
-/// Largest time between the items of a pair, nanoseconds: one frame at 30 Hz. Older colour shows another pose.
-pub(super) const MAX_GAP_NS: u64 = 33_400_000;
+use crate::rgbd_source::MAX_COLOR_GAP_NS;
 
 /// Items around a time, of a stream whose times ascend.
 #[derive(Debug)]
@@ -25,7 +24,7 @@ impl<T> NearestItem<T> {
         }
     }
 
-    /// The item that pairs with time `at`: the nearest one within [`MAX_GAP_NS`], unless a neighbour of `at` in its own
+    /// The item that pairs with time `at`: the nearest one within [`MAX_COLOR_GAP_NS`], unless a neighbour of `at` in its own
     /// stream is nearer to it. `next` yields items in order.
     ///
     /// # Errors
@@ -56,7 +55,7 @@ impl<T> NearestItem<T> {
                 .into_iter()
                 .flatten()
                 .any(|n| n.abs_diff(*t) < gap);
-            (gap <= MAX_GAP_NS && !is_taken).then_some(item)
+            (gap <= MAX_COLOR_GAP_NS && !is_taken).then_some(item)
         }))
     }
 }
@@ -122,8 +121,8 @@ mod tests {
                 if let Some(c) = got {
                     prop_assert_eq!(Some(c.abs_diff(*at)), gap);
                     prop_assert!(depth.iter().all(|d| d.abs_diff(c) >= c.abs_diff(*at)));
-                    prop_assert!(c.abs_diff(*at) <= MAX_GAP_NS);
-                } else if let Some(gap) = gap.filter(|g| *g <= MAX_GAP_NS) {
+                    prop_assert!(c.abs_diff(*at) <= MAX_COLOR_GAP_NS);
+                } else if let Some(gap) = gap.filter(|g| *g <= MAX_COLOR_GAP_NS) {
                     // Every nearest colour is nearer to another depth.
                     let mut nearest = color.iter().filter(|c| c.abs_diff(*at) == gap);
                     prop_assert!(nearest.any(|c| depth.iter().any(|d| d.abs_diff(*c) < gap)));

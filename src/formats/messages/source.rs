@@ -2,13 +2,13 @@
 
 use super::container::MessageContainer;
 use super::fault::MessageFault;
-use super::pairing::{MAX_GAP_NS, NearestItem};
+use super::pairing::NearestItem;
 use super::selection::{TopicWish, other_channels};
 use super::survey::Survey;
 use super::topic_images::{TimeBase, TimedImage, TopicImages};
 use crate::FormatError;
 use crate::rgbd_folder::read_camera;
-use crate::rgbd_source::RgbdSource;
+use crate::rgbd_source::{MAX_COLOR_GAP_NS, RgbdSource};
 use std::path::{Path, PathBuf};
 use tryon_geometry::camera::{
     Calibration, ColorImage, DepthImage, Intrinsics, LensCalibration, RgbdFrame,
@@ -263,7 +263,7 @@ impl MessageSource {
             all, without_color, ..
         } = self.counts;
         if let Some(color) = self.streams.color.as_ref().filter(|_| without_color > 0) {
-            let gap = MAX_GAP_NS as f64 * 1e-6;
+            let gap = MAX_COLOR_GAP_NS as f64 * 1e-6;
             notes.push(format!(
                 "`{color}`: {without_color} of {all} frames have no colour within {gap:.1} ms"
             ));

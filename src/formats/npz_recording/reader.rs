@@ -6,15 +6,12 @@ use crate::depth_metres::metres_to_mm;
 use crate::image::check_size;
 use crate::pinholes::pinholes;
 use crate::rgbd_folder::read_lenses;
-use crate::rgbd_source::RgbdSource;
+use crate::rgbd_source::{NOMINAL_PERIOD_NS, RgbdSource};
 use crate::zip_entries::{ZipFileArchive, open_zip};
 use std::path::{Path, PathBuf};
 use tryon_geometry::camera::{
     Calibration, ColorImage, DepthImage, Intrinsics, LensCalibration, RgbdFrame,
 };
-
-/// Frame period: npz has no times. 30 Hz, that of most depth cameras.
-const PERIOD_NS: u64 = 1_000_000_000 / 30;
 
 /// Largest depth of floating-point numbers, metres: greater ones are millimetres.
 const MAX_METRES: f64 = 100.0;
@@ -119,7 +116,7 @@ impl NpzReader {
         let depth = DepthImage::new(k.width, k.height, depth);
         Ok(RgbdFrame {
             sequence,
-            time_ns: sequence * PERIOD_NS,
+            time_ns: sequence * NOMINAL_PERIOD_NS,
             depth: depth.map_err(|e| fault("depth", e.to_string()))?,
             color: color
                 .transpose()

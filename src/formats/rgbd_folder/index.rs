@@ -4,13 +4,11 @@ use super::names::{nanoseconds, natural_order, stem};
 use super::pairing::{ImageList, pair_colors};
 use crate::FormatError;
 use crate::image::read_limited;
+use crate::rgbd_source::NOMINAL_PERIOD_NS;
 use std::path::Path;
 
 /// Largest time list, bytes; a day at 30 Hz has 180 MB.
 const MAX_LIST_BYTES: u64 = 256 << 20;
-
-/// Frame period of images without a time list, that of most depth cameras.
-const DEFAULT_PERIOD_NS: u64 = 1_000_000_000 / 30;
 
 /// Folders of colour.
 const COLOR_FOLDERS: [&str; 2] = ["rgb", "color"];
@@ -100,7 +98,7 @@ fn images(folder: &Path, name: &str, extensions: &[&str]) -> Result<ImageList, F
     let times: Option<Vec<u64>> = files.iter().map(seconds).collect();
     let has_times = times.is_some();
     let times = times.unwrap_or_else(|| {
-        let made_up = (0..files.len()).map(|i| i as u64 * DEFAULT_PERIOD_NS);
+        let made_up = (0..files.len()).map(|i| i as u64 * NOMINAL_PERIOD_NS);
         made_up.collect()
     });
     let mut images: Vec<(u64, String)> = times.into_iter().zip(files).collect();

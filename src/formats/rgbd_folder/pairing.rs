@@ -1,11 +1,8 @@
 //! Colour image of each depth image: by time where both have times, else by number, else by position.
 
 use super::names::frame_number;
+use crate::rgbd_source::MAX_COLOR_GAP_NS;
 use std::collections::BTreeMap;
-
-/// Largest time between colour and its depth, nanoseconds: half a period at 15 Hz, the slowest tracking rate. Older
-/// colour shows another pose.
-const MAX_GAP_NS: u64 = 33_400_000;
 
 /// Images of one camera, sorted by time.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -48,7 +45,7 @@ fn by_time(depth: &ImageList, color: &ImageList) -> Vec<Option<String>> {
         .collect()
 }
 
-/// Image nearest in time, within [`MAX_GAP_NS`].
+/// Image nearest in time, within [`MAX_COLOR_GAP_NS`].
 fn nearest(list: &[(u64, String)], time_ns: u64) -> Option<&str> {
     let after = list.partition_point(|(t, _)| *t < time_ns);
     let candidates = [after.checked_sub(1), Some(after)];
@@ -58,7 +55,7 @@ fn nearest(list: &[(u64, String)], time_ns: u64) -> Option<&str> {
         .flatten()
         .filter(|&i| i < list.len())
         .min_by_key(gap)?;
-    (gap(&best) <= MAX_GAP_NS).then_some(list[best].1.as_str())
+    (gap(&best) <= MAX_COLOR_GAP_NS).then_some(list[best].1.as_str())
 }
 
 /// Pairs of equal numbers; `None` if a name has none, two have the same, or none is in both lists.

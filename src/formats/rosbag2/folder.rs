@@ -4,7 +4,7 @@ use super::reader::SqliteMessages;
 use crate::FormatError;
 use crate::image::read_limited;
 use crate::mcap_file::McapMessages;
-use crate::messages::{MessageContainer, MessageHead, TopicChannel};
+use crate::messages::{ContainerStep, MessageContainer, TopicChannel};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -102,27 +102,28 @@ impl SplitMessages {
 }
 
 impl MessageContainer for SplitMessages {
-    fn next_message(
+    fn step(
         &mut self,
         is_wanted: &dyn Fn(&TopicChannel) -> bool,
         data: &mut Vec<u8>,
-    ) -> Result<Option<MessageHead>, FormatError> {
-        while let Some(current) = &mut self.current {
-            match current.next_message(is_wanted, data) {
-                Ok(Some(mut head)) => {
-                    head.number += self.messages_passed;
-                    self.messages = head.number;
-                    return Ok(Some(head));
-                }
-                Ok(None) => self.open_next()?,
-                Err(e) => {
-                    self.files.clear();
-                    self.current = None;
-                    return Err(e);
-                }
+    ) -> Result<ContainerStep, FormatError> {
+        let Some(current) = &mut self.current else {
+            return Ok(ContainerStep::End);
+        };
+        match current.step(is_wanted, data) {
+            Ok(ContainerStep::Message(mut head)) => {
+                head.number += self.messages_passed;
+                self.messages = head.number;
+                Ok(ContainerStep::Message(head))
+            }
+            Ok(ContainerStep::Other) => Ok(ContainerStep::Other),
+            Ok(ContainerStep::End) => self.open_next().map(|()| ContainerStep::Other),
+            Err(e) => {
+                self.files.clear();
+                self.current = None;
+                Err(e)
             }
         }
-        Ok(None)
     }
     fn channels(&self) -> Vec<Arc<TopicChannel>> {
         let current = self.current.iter().flat_map(|c| c.channels());

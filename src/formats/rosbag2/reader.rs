@@ -4,7 +4,7 @@ use super::sqlite_pages::SqlitePages;
 use super::sqlite_row::{RowFault, column};
 use super::sqlite_table::{RowPlace, TableRows, read_overflow};
 use crate::FormatError;
-use crate::messages::{MAX_RECORD, MessageContainer, MessageHead, TopicChannel};
+use crate::messages::{ContainerStep, MAX_RECORD, MessageContainer, MessageHead, TopicChannel};
 use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::ErrorKind;
@@ -194,39 +194,37 @@ impl SqliteMessages {
 }
 
 impl MessageContainer for SqliteMessages {
-    fn next_message(
+    fn step(
         &mut self,
         is_wanted: &dyn Fn(&TopicChannel) -> bool,
         data: &mut Vec<u8>,
-    ) -> Result<Option<MessageHead>, FormatError> {
-        while !self.is_ended {
-            let row = self.rows.next_row(&mut self.pages, data);
-            let read = row.and_then(|row| match row {
-                None => {
-                    self.is_ended = true;
-                    Ok(None)
+    ) -> Result<ContainerStep, FormatError> {
+        if self.is_ended {
+            return Ok(ContainerStep::End);
+        }
+        let row = self.rows.next_row(&mut self.pages, data);
+        let read = row.and_then(|row| {
+            let Some(place) = row else {
+                self.is_ended = true;
+                return Ok(ContainerStep::End);
+            };
+            self.messages += 1;
+            let head = self.message(&place, is_wanted, data)?;
+            Ok(head.map_or(ContainerStep::Other, ContainerStep::Message))
+        });
+        read.or_else(|fault| {
+            self.is_ended = true;
+            match fault {
+                RowFault::Io(e) if e.kind() == ErrorKind::UnexpectedEof && self.messages > 0 => {
+                    self.is_cut_short = true;
+                    Ok(ContainerStep::End)
                 }
-                Some(place) => {
-                    self.messages += 1;
-                    self.message(&place, is_wanted, data)
-                }
-            });
-            match read {
-                Ok(None) => {}
-                Ok(Some(head)) => return Ok(Some(head)),
-                Err(RowFault::Io(e))
-                    if e.kind() == ErrorKind::UnexpectedEof && self.messages > 0 =>
-                {
-                    (self.is_ended, self.is_cut_short) = (true, true);
-                }
-                Err(fault) => {
-                    self.is_ended = true;
+                fault => {
                     let after = format!("after message {}, ", self.messages);
-                    return Err(named(&self.path, &after, fault));
+                    Err(named(&self.path, &after, fault))
                 }
             }
-        }
-        Ok(None)
+        })
     }
     fn channels(&self) -> Vec<Arc<TopicChannel>> {
         self.channels.values().cloned().collect()
