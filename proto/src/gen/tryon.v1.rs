@@ -518,6 +518,10 @@ pub struct CameraFrame {
     pub color: ::prost::bytes::Bytes,
     #[prost(enumeration = "ColorEncoding", tag = "5")]
     pub color_encoding: i32,
+    /// Exposure time of the colour, nanoseconds of the same clock; 0 = that of the depth. Half a frame apart is said once, and
+    /// counted.
+    #[prost(uint64, tag = "6")]
+    pub color_time_ns: u64,
 }
 #[derive(Clone, PartialEq, ::prost::Message)]
 pub struct PublishFramesRequest {
@@ -559,6 +563,8 @@ pub enum CameraState {
     Ended = 3,
     /// The source failed; `detail` has the reason.
     Failed = 4,
+    /// Gives no frames; `detail` has the reason. A device is opened again until it is back, then it runs under a new epoch.
+    Lost = 5,
 }
 impl CameraState {
     /// String value of the enum field names used in the ProtoBuf definition.
@@ -572,6 +578,7 @@ impl CameraState {
             Self::Running => "CAMERA_STATE_RUNNING",
             Self::Ended => "CAMERA_STATE_ENDED",
             Self::Failed => "CAMERA_STATE_FAILED",
+            Self::Lost => "CAMERA_STATE_LOST",
         }
     }
     /// Creates an enum from field names used in the ProtoBuf definition.
@@ -582,6 +589,7 @@ impl CameraState {
             "CAMERA_STATE_RUNNING" => Some(Self::Running),
             "CAMERA_STATE_ENDED" => Some(Self::Ended),
             "CAMERA_STATE_FAILED" => Some(Self::Failed),
+            "CAMERA_STATE_LOST" => Some(Self::Lost),
             _ => None,
         }
     }
@@ -835,8 +843,8 @@ pub mod capture_service_client {
                 .insert(GrpcMethod::new("tryon.v1.CaptureService", "HoldConsent"));
             self.inner.unary(req, path, codec).await
         }
-        /// Runs the camera under a new epoch; frames are published while a lease of consent runs. FAILED_PRECONDITION when it already runs, UNAVAILABLE when the device or
-        /// file cannot be opened.
+        /// Runs the camera under a new epoch; frames are published while a lease of consent runs. FAILED_PRECONDITION when it already runs, UNAVAILABLE when a
+        /// recording cannot be opened. A device is opened after the answer: until it is there, its state is LOST.
         pub async fn start_camera(
             &mut self,
             request: impl tonic::IntoRequest<super::StartCameraRequest>,
@@ -1016,8 +1024,8 @@ pub mod capture_service_server {
             tonic::Response<super::HoldConsentResponse>,
             tonic::Status,
         >;
-        /// Runs the camera under a new epoch; frames are published while a lease of consent runs. FAILED_PRECONDITION when it already runs, UNAVAILABLE when the device or
-        /// file cannot be opened.
+        /// Runs the camera under a new epoch; frames are published while a lease of consent runs. FAILED_PRECONDITION when it already runs, UNAVAILABLE when a
+        /// recording cannot be opened. A device is opened after the answer: until it is there, its state is LOST.
         async fn start_camera(
             &self,
             request: tonic::Request<super::StartCameraRequest>,

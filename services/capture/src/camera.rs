@@ -1,13 +1,16 @@
 //! Task of one camera: commands, state, epochs.
 
 use crate::consent::Leases;
+use crate::live::{Awaited, DriverCalls, Liveness, Open, say_lost, until_back};
 use crate::push::{Feed, Newest, is_push};
-use crate::reader::Reader;
+use crate::reader::{ReadEnd, Reader};
 use crate::recorder::{Recorder, Recording};
-use crate::source::{OpenSource, open};
+use crate::source::{OpenSource, liveness};
+use std::future::pending;
 use std::path::PathBuf;
 use std::sync::Arc;
 use tokio::sync::{mpsc, oneshot, watch};
+use tokio::task::JoinHandle;
 use tokio_util::sync::CancellationToken;
 use tonic::Status;
 use tryon_geometry::camera::Calibration;
@@ -53,9 +56,10 @@ impl Handle {
     }
 }
 
-/// Starts the task of a camera; it ends with `ctx.shutdown`.
-pub(crate) fn spawn(mut config: CameraConfig, key: CameraKey, ctx: Context) -> Handle {
-    if is_push(&config.source) {
+/// Starts the task of a camera, whose sources `open` opens; it ends with `ctx.shutdown`.
+pub(crate) fn spawn(mut config: CameraConfig, key: CameraKey, ctx: Context, open: Open) -> Handle {
+    let liveness = liveness(&config.source);
+    if liveness != Liveness::Patient {
         // Its frames come at their pace, once.
         (config.fast, config.looped) = (true, false);
     }
@@ -77,7 +81,11 @@ pub(crate) fn spawn(mut config: CameraConfig, key: CameraKey, ctx: Context) -> H
             info: Arc::new(sender),
             recorder,
             leases: leases.clone(),
+            liveness,
+            open,
+            calls: DriverCalls::default(),
             run: None,
+            awaited: Awaited::default(),
         }
         .serve(inbox),
     );
@@ -98,7 +106,9 @@ fn shown(source: &str) -> String {
 /// Run of a camera from start to stop.
 struct Run {
     stop: CancellationToken,
-    task: tokio::task::JoinHandle<()>,
+    task: JoinHandle<()>,
+    /// Its end, unless somebody stopped it.
+    end: oneshot::Receiver<ReadEnd>,
     calibration: Calibration,
     /// Frames of the program that feeds it.
     newest: Option<Arc<Newest>>,
@@ -111,7 +121,22 @@ struct Task {
     info: Arc<watch::Sender<v1::CameraInfo>>,
     recorder: Recorder,
     leases: Leases,
+    liveness: Liveness,
+    open: Open,
+    calls: DriverCalls,
     run: Option<Run>,
+    awaited: Awaited,
+}
+
+/// Waits until a run has lost its device.
+async fn lost(run: &mut Option<Run>) {
+    let end = match run {
+        Some(run) if !run.end.is_terminated() => (&mut run.end).await,
+        _ => pending().await,
+    };
+    if end != Ok(ReadEnd::Lost) {
+        pending().await
+    }
 }
 
 impl Task {
@@ -121,6 +146,14 @@ impl Task {
             let command = tokio::select! {
                 c = inbox.recv() => c,
                 () = shutdown.cancelled() => None,
+                () = lost(&mut self.run) => {
+                    self.await_device();
+                    continue;
+                }
+                source = self.awaited.back() => {
+                    self.returned(source).await;
+                    continue;
+                }
             };
             let Some(command) = command else { break };
             // The send fails when the caller has hung up.
@@ -140,7 +173,7 @@ impl Task {
     }
 
     async fn open(&self) -> Result<OpenSource, String> {
-        let name = self.config.source.clone();
+        let (name, open) = (self.config.source.clone(), self.open);
         match self.ctx.pool.run(move || open(&name)).await {
             Ok(opened) => opened.map_err(|e| e.to_string()),
             Err(e) => Err(e.to_string()),
@@ -148,13 +181,18 @@ impl Task {
     }
 
     async fn start(&mut self) -> Result<v1::CameraInfo, Status> {
-        if self.run.as_ref().is_some_and(|r| !r.task.is_finished()) {
+        if self.awaited.is_running() || self.run.as_ref().is_some_and(|r| !r.task.is_finished()) {
             return Err(Status::failed_precondition(format!(
                 "camera `{}` is running",
                 self.key.camera()
             )));
         }
         self.stop().await;
+        if self.liveness == Liveness::Reopened {
+            say_lost(&self.info, "is being opened");
+            self.await_device();
+            return Ok(self.info.borrow().clone());
+        }
         let source = match self.open().await {
             Ok(s) => s,
             Err(why) => {
@@ -167,6 +205,24 @@ impl Task {
             }
         };
         self.read(source, None).await
+    }
+
+    /// Opens a device whenever it is there, with commands served meanwhile.
+    fn await_device(&mut self) {
+        let name = self.config.source.clone();
+        let (calls, info) = (self.calls.clone(), self.info.clone());
+        self.awaited.begin(until_back(self.open, name, calls, info));
+    }
+
+    /// Reads a device that is back. A recording ends: its clock and calibration were those of before.
+    async fn returned(&mut self, source: OpenSource) {
+        if let Ok(done) = self.end_recording().await {
+            tracing::warn!(camera = %self.key, file = done.file, "recorded until the device was lost");
+        }
+        if let Err(why) = self.read(source, None).await {
+            say_lost(&self.info, why.message());
+            self.await_device();
+        }
     }
 
     /// Runs on the frames of a program; the one before it ends.
@@ -210,18 +266,22 @@ impl Task {
             info: self.info.clone(),
             recorder: self.recorder.clone(),
             leases: self.leases.clone(),
+            liveness: self.liveness,
+            calls: self.calls.clone(),
             flow: (self.ctx.stalls).flow("capture", format!("frames of {}", self.key)),
         };
         let stopped = stop.clone();
+        let (ended, end) = oneshot::channel();
         let task = tokio::spawn(async move {
             tokio::select! {
-                () = reader.run(publisher) => {}
+                end = reader.run(publisher) => drop(ended.send(end)),
                 () = stopped.cancelled() => {}
             }
         });
         self.run = Some(Run {
             stop,
             task,
+            end,
             calibration,
             newest,
         });
@@ -230,6 +290,7 @@ impl Task {
     }
 
     async fn stop(&mut self) {
+        self.awaited.end();
         if let Some(run) = self.run.take() {
             if let Some(newest) = &run.newest {
                 newest.close();
@@ -239,7 +300,7 @@ impl Task {
         }
         let _ = self.end_recording().await;
         self.info.send_modify(|i| {
-            if i.state() == CameraState::Running {
+            if matches!(i.state(), CameraState::Running | CameraState::Lost) {
                 i.set_state(CameraState::Stopped);
             }
         });
@@ -248,6 +309,9 @@ impl Task {
     async fn calibration(&self) -> Result<Calibration, Status> {
         if let Some(run) = &self.run {
             return Ok(run.calibration.clone());
+        }
+        if self.liveness == Liveness::Reopened {
+            return Err(unavailable("capture", "the device is not open"));
         }
         self.open()
             .await

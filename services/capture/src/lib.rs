@@ -9,11 +9,15 @@
 //! - Consent to record: [`mod@service`].
 //! - Frames of another program: [`mod@push`].
 //! - Pace of a source: [`mod@pace`].
+//! - Silence of a camera, and its return: [`mod@live`].
 #![allow(rustdoc::private_intra_doc_links)] // the index of ideas names private modules
 
 mod camera;
 mod check;
 mod consent;
+mod live;
+#[cfg(test)]
+mod live_tests;
 mod pace;
 mod pattern;
 mod push;

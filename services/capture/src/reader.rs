@@ -1,7 +1,8 @@
 //! Reader of a source: frames at their pace, onto the bus under a lease of consent, and into a recording.
 
 use crate::consent::Leases;
-use crate::pace::Pace;
+use crate::live::{DriverCalls, Liveness, Silence, say_back};
+use crate::pace::{ClockFault, Moment, Pace};
 use crate::recorder::Recorder;
 use crate::source::OpenSource;
 use std::sync::Arc;
@@ -25,6 +26,15 @@ const MAX_FAULTS: u32 = 30;
 const UNRECEIVED: &str = "somebody consented to frames that nobody receives: do bus.connect of tracking and compositor, and \
                           the router's connect.endpoints, lead to this process?";
 
+/// End of a run that nobody stopped.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum ReadEnd {
+    /// The source has ended or failed.
+    Over,
+    /// A device is to be opened anew.
+    Lost,
+}
+
 /// Reader of one run of a source.
 pub(crate) struct Reader {
     /// `None` while its thread reads it.
@@ -37,6 +47,8 @@ pub(crate) struct Reader {
     pub(crate) info: Arc<watch::Sender<v1::CameraInfo>>,
     pub(crate) recorder: Recorder,
     pub(crate) leases: Leases,
+    pub(crate) liveness: Liveness,
+    pub(crate) calls: DriverCalls,
     /// From here to somebody who receives the frames.
     pub(crate) flow: Flow,
 }
@@ -59,12 +71,27 @@ async fn wanted(leases: &Leases, mut info: watch::Receiver<v1::CameraInfo>) -> D
 }
 
 impl Reader {
-    fn end(&self, state: CameraState, why: String) {
+    fn end(&self, state: CameraState, why: String) -> ReadEnd {
         tracing::info!(camera = self.config.name, ?state, %why, "the source has ended");
         self.info.send_modify(|i| {
             i.set_state(state);
             i.detail = why;
         });
+        ReadEnd::Over
+    }
+
+    /// Counts a fault of the clock; its frame is ordered after those before it.
+    fn clock_fault(&self, fault: ClockFault) {
+        let labels = [
+            ("camera", self.config.name.clone()),
+            ("fault", fault.name().into()),
+        ];
+        metrics::counter!("tryon_clock_faults", &labels).increment(1);
+        tracing::debug!(
+            camera = self.config.name,
+            fault = fault.name(),
+            "a clock at fault"
+        );
     }
 
     /// Shows, once, that the recording has ended by a fault; StopRecording tells its kind. Publishing goes on.
@@ -78,12 +105,12 @@ impl Reader {
         }
     }
 
-    /// The next frame; a looped source rewinds at its end.
-    async fn read(&mut self) -> Result<Option<RgbdFrame>, String> {
+    /// The next frame; a looped source rewinds at its end. `None` when a device is given up.
+    async fn read(&mut self, silence: &Silence) -> Option<Result<Option<RgbdFrame>, String>> {
         let Some(mut source) = self.source.take() else {
-            return Err("the source was lost to a panic".into());
+            return Some(Err("the source was lost to a panic".into()));
         };
-        let looped = self.config.looped;
+        let (looped, call) = (self.config.looped, self.calls.begin());
         let read = move || {
             let frame = match source.next_frame() {
                 Ok(None) if looped && !source.is_empty() => {
@@ -91,32 +118,54 @@ impl Reader {
                 }
                 other => other,
             };
+            drop(call);
             (source, frame)
         };
-        let (source, frame) = self.thread.run(read).await.map_err(|e| e.to_string())?;
-        self.source = Some(source);
-        frame.map_err(|e| e.to_string())
+        // Dropped, it leaves a call that hangs to its thread, which ends with it.
+        let read = silence.within(&self.info, self.thread.run(read)).await?;
+        Some(match read {
+            Ok((source, frame)) => {
+                self.source = Some(source);
+                frame.map_err(|e| e.to_string())
+            }
+            Err(e) => Err(e.to_string()),
+        })
     }
 
-    /// Publishes frames until the source ends or fails.
-    pub(crate) async fn run(mut self, mut publisher: Box<dyn FramePublisher>) {
-        let (mut pace, mut faults, mut sequence) = (Pace::new(), 0, 0);
+    /// Publishes frames until the source ends, fails or is lost.
+    pub(crate) async fn run(mut self, mut publisher: Box<dyn FramePublisher>) -> ReadEnd {
+        let is_live = self.liveness != Liveness::Patient;
+        let (mut pace, mut faults, mut sequence) = (Pace::new(is_live), 0, 0);
+        let mut silence = Silence::new(self.liveness);
         let mut sampler = Sampler::default();
         loop {
             let pause = wanted(&self.leases, self.info.subscribe()).await;
             if !pause.is_zero() {
                 self.flow.moves();
+                silence = Silence::new(self.liveness);
             }
             pace.pause(pause);
+            if faults == 0 {
+                silence.restart();
+            }
             let start = Instant::now();
-            let frame = match self.read().await {
+            let Some(read) = self.read(&silence).await else {
+                return ReadEnd::Lost;
+            };
+            let is_device = self.liveness == Liveness::Reopened;
+            let frame = match read {
                 Ok(Some(f)) => f,
+                Ok(None) if is_device => return ReadEnd::Lost,
                 Ok(None) => return self.end(CameraState::Ended, String::new()),
+                Err(why) if is_device && self.source.is_none() => {
+                    tracing::error!(camera = self.config.name, %why, "a driver is lost");
+                    return ReadEnd::Lost;
+                }
                 Err(why) => {
                     faults += 1;
                     tracing::warn!(camera = self.config.name, %why, "left out a frame");
                     metrics::counter!("tryon_capture_faults").increment(1);
-                    if faults == MAX_FAULTS || self.source.is_none() {
+                    if (faults == MAX_FAULTS && !is_device) || self.source.is_none() {
                         return self.end(CameraState::Failed, why);
                     }
                     tokio::time::sleep(AFTER_FAULT).await;
@@ -124,8 +173,17 @@ impl Reader {
                 }
             };
             faults = 0;
+            silence.frame();
+            say_back(&self.info);
             let read = stage("capture.read", start);
-            let (time_ns, due) = pace.next(frame.time_ns, &self.config);
+            let Moment {
+                time_ns,
+                due,
+                fault,
+            } = pace.next(frame.time_ns, &self.config);
+            if let Some(fault) = fault {
+                self.clock_fault(fault);
+            }
             if let Some(due) = due {
                 tokio::time::sleep_until(due).await;
             }

@@ -1,5 +1,6 @@
 //! Sources of a camera: `synth`, `pattern`, `push`, or a recording.
 
+use crate::live::Liveness;
 use crate::pattern::Pattern;
 use crate::push::is_push;
 use std::path::Path;
@@ -43,6 +44,15 @@ pub(crate) fn check(name: &str) -> Result<(), SourceError> {
     match kind(name)? {
         SourceKind::Recording(path) => recording(name, path).map(drop),
         SourceKind::Pattern | SourceKind::Push | SourceKind::Synth(_) => Ok(()),
+    }
+}
+
+/// Expectation of a source's next frame.
+pub(crate) fn liveness(name: &str) -> Liveness {
+    match kind(name) {
+        Ok(SourceKind::Push) => Liveness::Said,
+
+        _ => Liveness::Patient,
     }
 }
 

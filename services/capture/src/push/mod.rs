@@ -3,6 +3,7 @@
 mod description;
 mod feed;
 mod newest;
+mod offset;
 mod source;
 
 pub(crate) use feed::{Feed, first, is_push, open};

@@ -2,6 +2,7 @@
 
 use super::description::Description;
 use super::newest::Newest;
+use super::offset::ColorOffset;
 use std::path::PathBuf;
 use std::sync::Arc;
 use tryon_formats::image::{decode_color, yuyv_to_rgb};
@@ -18,6 +19,7 @@ pub(super) struct PushSource {
     description: Description,
     calibration: Calibration,
     newest: Arc<Newest>,
+    offset: ColorOffset,
 }
 
 impl PushSource {
@@ -33,6 +35,7 @@ impl PushSource {
             description,
             calibration,
             newest,
+            offset: ColorOffset::default(),
         }
     }
 
@@ -97,6 +100,7 @@ impl RgbdSource for PushSource {
         let Some(frame) = self.newest.take() else {
             return Ok(None);
         };
+        self.offset.note(&self.name.to_string_lossy(), &frame);
         let decoded = self.decode(&frame);
         let (outcome, detail) = match &decoded {
             Ok(_) => (FrameOutcome::Taken, String::new()),
