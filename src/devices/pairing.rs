@@ -2,6 +2,7 @@
 
 use super::Stream;
 use super::driver::{Formats, RawImage};
+use std::collections::VecDeque;
 use std::sync::Arc;
 
 /// Depth and the colour of its time.
@@ -13,15 +14,22 @@ pub(crate) struct Pair {
     pub(crate) color: Option<Arc<RawImage>>,
 }
 
-/// Pairing of two streams whose images come in any order.
+/// Colour images kept: depth may come as many images later than its colour.
+const MAX_COLORS: usize = 4;
+/// Depth images that wait: colour may come as many images later than its depth.
+const MAX_WAITING: usize = 3;
+
+/// Pairing of two streams whose images come in any order, each stream in its own.
 pub(crate) struct Pairing {
     /// Largest time between depth and its colour, nanoseconds; `None` without colour.
     half_period_ns: Option<u64>,
-    /// Newest colour.
-    color: Option<Arc<RawImage>>,
+    /// Newest last.
+    colors: VecDeque<Arc<RawImage>>,
     /// Depth without colour so far, and its number.
-    waiting: Option<(u64, RawImage)>,
+    waiting: VecDeque<(u64, RawImage)>,
     next: u64,
+    /// Time of the last depth.
+    last_ns: u64,
     /// Depth images that had no colour of their time.
     pub(crate) unpaired: u64,
 }
@@ -34,48 +42,27 @@ impl Pairing {
             half_period_ns: formats
                 .color
                 .map(|color| half_period(color.rate.min(formats.depth.rate).max(1.0))),
-            color: None,
-            waiting: None,
+            colors: VecDeque::new(),
+            waiting: VecDeque::new(),
             next: 0,
+            last_ns: 0,
             unpaired: 0,
         }
     }
 
-    /// Takes an image in and passes on the pairs that it completes.
+    /// Takes an image in and passes on the pairs that it completes, in the order of depth.
     pub(crate) fn push(&mut self, image: RawImage, sink: &mut dyn FnMut(Pair)) {
         match image.stream {
-            Stream::Depth => self.push_depth(image, sink),
-            Stream::Color => self.push_color(image, sink),
+            Stream::Depth => self.push_depth(image),
+            Stream::Color => self.push_color(image),
         }
-    }
-
-    fn push_depth(&mut self, depth: RawImage, sink: &mut dyn FnMut(Pair)) {
-        // No colour came between two depth images.
-        self.release(sink);
-        self.waiting = Some((self.next, depth));
-        self.next += 1;
-        // Colour within half a period is the nearest: the next one is farther.
-        if self.half_period_ns.is_none() || self.near_color().is_some() {
-            self.release(sink);
-        }
-    }
-
-    fn push_color(&mut self, color: RawImage, sink: &mut dyn FnMut(Pair)) {
-        self.color = Some(Arc::new(color));
-        self.release(sink);
-    }
-
-    /// Newest colour if it is of the waiting depth's time.
-    fn near_color(&self) -> Option<Arc<RawImage>> {
-        let (color, (_, depth)) = (self.color.as_ref()?, self.waiting.as_ref()?);
-        let gap = color.time_ns.abs_diff(depth.time_ns);
-        (gap <= self.half_period_ns?).then(|| color.clone())
-    }
-
-    /// Passes on the depth that waits.
-    fn release(&mut self, sink: &mut dyn FnMut(Pair)) {
-        let color = self.near_color();
-        if let Some((number, depth)) = self.waiting.take() {
+        while let Some((number, depth)) = self.waiting.pop_front() {
+            let color = self.near_color(depth.time_ns);
+            let is_due = color.is_some() || self.waiting.len() >= MAX_WAITING;
+            if !is_due && !self.is_passed(depth.time_ns) {
+                self.waiting.push_front((number, depth));
+                break;
+            }
             self.unpaired += u64::from(color.is_none() && self.half_period_ns.is_some());
             sink(Pair {
                 number,
@@ -83,6 +70,39 @@ impl Pairing {
                 color,
             });
         }
+    }
+
+    fn push_depth(&mut self, depth: RawImage) {
+        if depth.time_ns < self.last_ns {
+            // The clock has jumped back: colour of before is of no depth to come.
+            self.colors.clear();
+        }
+        self.last_ns = depth.time_ns;
+        self.waiting.push_back((self.next, depth));
+        self.next += 1;
+    }
+
+    fn push_color(&mut self, color: RawImage) {
+        if self.colors.len() == MAX_COLORS {
+            self.colors.pop_front();
+        }
+        self.colors.push_back(Arc::new(color));
+    }
+
+    /// Nearest colour within half a period. A later one would be farther.
+    fn near_color(&self, time_ns: u64) -> Option<Arc<RawImage>> {
+        let half_period_ns = self.half_period_ns?;
+        let gap = |color: &&Arc<RawImage>| color.time_ns.abs_diff(time_ns);
+        let nearest = self.colors.iter().min_by_key(gap)?;
+        (gap(&nearest) <= half_period_ns).then(|| nearest.clone())
+    }
+
+    /// True if colour has gone on past a time, so that none of it comes any more.
+    fn is_passed(&self, time_ns: u64) -> bool {
+        self.half_period_ns.is_none_or(|half_period_ns| {
+            let newest = self.colors.back();
+            newest.is_some_and(|color| color.time_ns > time_ns.saturating_add(half_period_ns))
+        })
     }
 }
 
@@ -173,6 +193,36 @@ mod tests {
             pairs(None, &[('d', 100), ('d', 133)]),
             [(0, 100, None), (1, 133, None)]
         );
+    }
+
+    #[test]
+    fn colour_that_comes_two_images_late_is_waited_for_and_no_longer() {
+        let late = pairs(
+            Some(30.0),
+            &[
+                ('d', 0),
+                ('d', 33),
+                ('c', 0),
+                ('d', 66),
+                ('c', 33),
+                ('c', 66),
+            ],
+        );
+        assert_eq!(
+            late,
+            [(0, 0, Some(0)), (1, 33, Some(33)), (2, 66, Some(66))]
+        );
+        let never = pairs(
+            Some(30.0),
+            &[('d', 0), ('d', 33), ('d', 66), ('d', 100), ('d', 133)],
+        );
+        assert_eq!(never, [(0, 0, None), (1, 33, None)]);
+        // Depth that comes late.
+        let early = pairs(
+            Some(30.0),
+            &[('c', 0), ('c', 33), ('d', 1), ('c', 66), ('d', 34)],
+        );
+        assert_eq!(early, [(0, 1, Some(0)), (1, 34, Some(33))]);
     }
 
     #[test]

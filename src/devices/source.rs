@@ -2,11 +2,11 @@
 
 use super::DeviceError;
 use super::decode::{decode_color_image, decode_depth_image};
-use super::driver::{Formats, Opened, StreamFormat};
+use super::driver::{Formats, Opened};
 use super::pump::Pump;
 use std::path::PathBuf;
 use tryon_formats::{FormatError, Rectified, RgbdSource};
-use tryon_geometry::camera::{Calibration, Intrinsics, LensCalibration, RgbdFrame};
+use tryon_geometry::camera::{Calibration, LensCalibration, RgbdFrame};
 
 /// Source of a camera's frames, lens distortion included.
 struct DeviceSource {
@@ -22,7 +22,7 @@ struct DeviceSource {
 /// Starts a camera: rectified frames, the newest at each call.
 ///
 /// # Errors
-/// A calibration of another image size.
+/// When the system gives no thread.
 pub(crate) fn start(opened: Opened) -> Result<Box<dyn RgbdSource>, DeviceError> {
     let Opened {
         name,
@@ -31,7 +31,6 @@ pub(crate) fn start(opened: Opened) -> Result<Box<dyn RgbdSource>, DeviceError> 
         lenses,
         depth_scale,
     } = opened;
-    check_sizes(&name, &formats, &lenses)?;
     let pump = Pump::start(&name, driver, &formats)?;
     let path = PathBuf::from(name);
     let source = DeviceSource {
@@ -47,28 +46,6 @@ pub(crate) fn start(opened: Opened) -> Result<Box<dyn RgbdSource>, DeviceError> 
         pump,
     };
     Ok(Rectified::wrap(&path, Box::new(source)))
-}
-
-/// Compares image sizes with those of the calibration.
-fn check_sizes(name: &str, formats: &Formats, lenses: &LensCalibration) -> Result<(), DeviceError> {
-    let check = |stream: &str, format: &StreamFormat, k: &Intrinsics| {
-        if (format.width, format.height) == (k.width, k.height) {
-            return Ok(());
-        }
-        let (got, want) = ((format.width, format.height), (k.width, k.height));
-        let why = format!("{stream} images have {got:?} pixels, the calibration {want:?}");
-        Err(DeviceError::calibration(name, why))
-    };
-    check("depth", &formats.depth, &lenses.depth.intrinsics)?;
-    match &formats.color {
-        // Without a lens of its own colour is registered to depth.
-        Some(color) => check(
-            "color",
-            color,
-            &lenses.color.unwrap_or(lenses.depth).intrinsics,
-        ),
-        None => Ok(()),
-    }
 }
 
 impl RgbdSource for DeviceSource {

@@ -6,7 +6,7 @@ mod ticks;
 
 pub(crate) use disparity::disparity_to_mm;
 
-use super::calibration::given;
+use super::calibration::{check_sizes, given};
 use super::device::{choose, source_name};
 use super::driver::{Driver, Encoding, Formats, Opened, POLL, RawImage, StreamFormat};
 use super::{Device, DeviceError, DeviceOptions, Family, Mode, Stream};
@@ -92,16 +92,18 @@ pub(super) fn open(serial: Option<&str>, options: &DeviceOptions) -> Result<Open
     };
     let of = |stream| best(&context, stream).ok_or_else(|| unoffered(stream));
     let (depth, color) = (of(Stream::Depth)?, of(Stream::Color)?);
+    let (lenses, depth_scale) = match given(&name, options)? {
+        Some(file) => (file.lenses, file.depth_scale),
+        None => (lenses(depth.format), MILLIMETRES),
+    };
+    let formats = formats(&depth, &color);
+    check_sizes(&name, &formats, &lenses)?;
     let camera = context
         .start(&serial, depth, color)
         .map_err(|(call, code)| {
             let why = format!("libfreenect answers {code}: is it used by another program?");
             DeviceError::driver(&name, call, why)
         })?;
-    let (lenses, depth_scale) = match given(&name, options)? {
-        Some(file) => (file.lenses, file.depth_scale),
-        None => (lenses(depth.format), MILLIMETRES),
-    };
     Ok(Opened {
         driver: Box::new(FreenectDriver {
             name: name.clone(),
@@ -109,7 +111,7 @@ pub(super) fn open(serial: Option<&str>, options: &DeviceOptions) -> Result<Open
             clock: TickClock::default(),
         }),
         name,
-        formats: formats(&depth, &color),
+        formats,
         lenses,
         depth_scale,
     })

@@ -3,7 +3,7 @@
 mod ffi;
 mod modes;
 
-use super::calibration::given;
+use super::calibration::{check_sizes, given};
 use super::device::{choose, source_name};
 use super::driver::{Driver, Formats, Opened, POLL, RawImage, StreamFormat};
 use super::packed::packed_rows;
@@ -74,11 +74,10 @@ pub(super) fn open(serial: Option<&str>, options: &DeviceOptions) -> Result<Open
     // A file with two lenses describes images that the camera leaves where they are.
     let is_apart = file.as_ref().is_some_and(|f| f.lenses.color.is_some());
     let is_registered = !is_apart && device.register_depth();
-    let depth = start(&device, Stream::Depth, file.as_ref());
-    let depth = depth.and_then(|d| d.ok_or(("depth", "the camera has no depth".into())));
-    let depth = depth.map_err(|(call, why)| DeviceError::driver(&name, call, why))?;
-    let color = start(&device, Stream::Color, file.as_ref())
-        .map_err(|(call, why)| DeviceError::driver(&name, call, why))?;
+    let fault = |(call, why): Refusal| DeviceError::driver(&name, call, why);
+    let depth = prepare(&device, Stream::Depth, file.as_ref()).map_err(fault)?;
+    let depth = depth.ok_or_else(|| fault(("depth", "the camera has none".into())))?;
+    let color = prepare(&device, Stream::Color, file.as_ref()).map_err(fault)?;
     if color.is_none() {
         tracing::warn!(camera = name, "it has no colour that OpenNI delivers");
     }
@@ -96,15 +95,20 @@ pub(super) fn open(serial: Option<&str>, options: &DeviceOptions) -> Result<Open
         depth: depth.format,
         color: color.as_ref().map(|c| c.format),
     };
+    check_sizes(&name, &formats, &lenses)?;
     let depth_scale = depth.known.depth_scale;
     let streams = [Some(depth.stream), color.map(|c| c.stream)];
+    let driver = OpenniDriver {
+        name: name.clone(),
+        streams: streams.into_iter().flatten().collect(),
+        formats,
+        _device: device,
+    };
+    for stream in &driver.streams {
+        stream.start().map_err(fault)?;
+    }
     Ok(Opened {
-        driver: Box::new(OpenniDriver {
-            name: name.clone(),
-            streams: streams.into_iter().flatten().collect(),
-            formats,
-            _device: device,
-        }),
+        driver: Box::new(driver),
         name,
         formats,
         lenses,
@@ -112,19 +116,19 @@ pub(super) fn open(serial: Option<&str>, options: &DeviceOptions) -> Result<Open
     })
 }
 
-/// A running stream.
-struct Running {
+/// A stream, not yet started.
+struct Prepared {
     stream: OniStream,
     format: StreamFormat,
     known: Known,
 }
 
-/// Starts a stream in the size of the given calibration, or VGA; `None` if the camera lacks it.
-fn start(
+/// Makes a stream in the size of the given calibration, or VGA; `None` if the camera lacks it.
+fn prepare(
     device: &OniDevice,
     stream: Stream,
     file: Option<&CameraFile>,
-) -> Result<Option<Running>, Refusal> {
+) -> Result<Option<Prepared>, Refusal> {
     let lenses = file.map(|f| &f.lenses);
     let lens = lenses.map(|l| match stream {
         Stream::Depth => l.depth,
@@ -134,23 +138,22 @@ fn start(
     let Some(wanted) = best_mode(stream, size, &device.modes(sensor(stream))) else {
         return Ok(None);
     };
-    let started = device.stream(sensor(stream), wanted)?;
-    let mode = started.mode().unwrap_or(wanted);
+    let made = device.stream(sensor(stream), wanted)?;
+    let mode = made.mode().unwrap_or(wanted);
     let Some(known) = understood(stream, mode.pixel_format) else {
         return Err((
             stream.name(),
             format!("pixel format {} is not read", mode.pixel_format),
         ));
     };
-    started.start()?;
     let format = StreamFormat {
         encoding: known.encoding,
         width: mode.width.unsigned_abs(),
         height: mode.height.unsigned_abs(),
         rate: f64::from(mode.fps),
     };
-    Ok(Some(Running {
-        stream: started,
+    Ok(Some(Prepared {
+        stream: made,
         format,
         known,
     }))
@@ -159,8 +162,8 @@ fn start(
 /// Lenses of the fields of view that the camera states; registered depth is in the colour camera's image.
 fn stated_lenses(
     name: &str,
-    depth: &Running,
-    color: Option<&Running>,
+    depth: &Prepared,
+    color: Option<&Prepared>,
     is_registered: bool,
 ) -> Result<LensCalibration, DeviceError> {
     let way = "give a camera.json (`camera = PATH`)";

@@ -6,6 +6,8 @@ use std::time::Duration;
 
 /// `ONI_STATUS_TIME_OUT`.
 const TIME_OUT: c_int = 102;
+/// Time in which a driver's thread sees that its stream was stopped. OpenNI's dummy does not wait for its own.
+const SETTLING: Duration = Duration::from_millis(50);
 /// `ONI_STREAM_PROPERTY_HORIZONTAL_FOV`, `…_VERTICAL_FOV`, `…_VIDEO_MODE` and `…_MIRRORING`.
 const HORIZONTAL_FOV: c_int = 1;
 const VERTICAL_FOV: c_int = 2;
@@ -110,10 +112,10 @@ impl OniStream {
 impl Drop for OniStream {
     fn drop(&mut self) {
         // SAFETY: the stream exists, and nothing uses it any more. Stopping a stopped stream does nothing.
-        unsafe {
-            (self.functions.oniStreamStop)(self.handle);
-            (self.functions.oniStreamDestroy)(self.handle);
-        }
+        unsafe { (self.functions.oniStreamStop)(self.handle) };
+        std::thread::sleep(SETTLING);
+        // SAFETY: as above, and the driver's thread has ended.
+        unsafe { (self.functions.oniStreamDestroy)(self.handle) };
     }
 }
 
