@@ -204,3 +204,6 @@ impl Driver for V4l2Driver {
         Ok(())
     }
 }
+
+#[cfg(test)]
+mod tests;
