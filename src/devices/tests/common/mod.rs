@@ -36,31 +36,41 @@ pub(crate) fn disparity(image: u32, pixel: usize) -> u16 {
 
 /// Colour of a pixel of an image.
 pub(crate) fn color(image: u32, pixel: usize) -> [u8; 3] {
-    [pixel as u8, (pixel / 640) as u8, 16 * image as u8]
+    [pixel as u8, (pixel / 640) as u8, 40 + 30 * image as u8]
 }
 
 /// Writes a recording of `images` images of each stream at 30 Hz, played `rounds` times; the device's clock begins at
 /// `ticks` and goes on through all rounds.
 pub(crate) fn write_recording(folder: &Path, images: u32, rounds: u32, ticks: u32) {
-    let mut index = String::new();
-    for k in 0..images * rounds {
-        let image = k % images;
-        let (seconds, ticks) = (1000.0 + f64::from(k) / 30.0, ticks.wrapping_add(PERIOD * k));
-        let depth = format!("d-{seconds:.6}-{ticks}.pgm");
-        let rgb = format!(
-            "r-{:.6}-{}.ppm",
-            seconds + 0.005,
-            ticks.wrapping_add(COLOR_DELAY)
-        );
-        let values = (0..PIXELS).flat_map(|p| disparity(image, p).to_le_bytes());
+    for image in 0..images {
+        let depth = (0..PIXELS).flat_map(|p| disparity(image, p).to_le_bytes());
+        let header = b"P5 640 480 65535\n";
         write(
-            &folder.join(&depth),
-            b"P5 640 480 65535\n",
-            values.collect(),
+            &folder.join(format!("depth{image}")),
+            header,
+            depth.collect(),
         );
-        let pixels = (0..PIXELS).flat_map(|p| color(image, p));
-        write(&folder.join(&rgb), b"P6 640 480 255\n", pixels.collect());
-        index += &format!("{depth}\n{rgb}\n");
+        let rgb = (0..PIXELS).flat_map(|p| color(image, p));
+        let header = b"P6 640 480 255\n";
+        write(&folder.join(format!("rgb{image}")), header, rgb.collect());
+    }
+    let mut index = String::new();
+    let mut add = |name: String, content: String| {
+        fs::hard_link(folder.join(content), folder.join(&name)).expect("linked");
+        index += &format!("{name}\n");
+    };
+    for k in 0..images * rounds {
+        let (image, seconds) = (k % images, 1000.0 + f64::from(k) / 30.0);
+        let ticks = ticks.wrapping_add(PERIOD.wrapping_mul(k));
+        let late = (seconds + 0.005, ticks.wrapping_add(COLOR_DELAY));
+        add(
+            format!("d-{seconds:.6}-{ticks}.pgm"),
+            format!("depth{image}"),
+        );
+        add(
+            format!("r-{:.6}-{}.ppm", late.0, late.1),
+            format!("rgb{image}"),
+        );
     }
     fs::write(folder.join("INDEX.txt"), index).expect("written");
 }
