@@ -77,6 +77,7 @@ pub fn open_with(
     options: &DeviceOptions,
 ) -> Result<Box<dyn RgbdSource>, DeviceError> {
     let (family, serial) = parse(source)?;
+    pump::settle();
     let opened = match family {
         Family::Freenect => freenect::open(serial, options),
         Family::Openni => openni::open(serial, options),

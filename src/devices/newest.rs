@@ -127,6 +127,7 @@ mod tests {
     fn a_pair_of_before_the_reader_came_is_not_given() {
         let newest = Newest::new(Duration::ZERO);
         newest.put(pair(1));
+        #[allow(clippy::disallowed_methods)] // the age of an image is the matter
         std::thread::sleep(Duration::from_millis(2));
         newest.fail(DeviceError::driver("openni:1", "depth", "gone"));
         assert!(newest.take().is_err());

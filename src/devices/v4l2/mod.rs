@@ -75,8 +75,8 @@ impl Places {
             let why = "V4L2 states no calibration: give a camera.json (`camera = PATH`), for instance of `rs-enumerate-devices -c`";
             return Err(DeviceError::calibration(&name, why));
         };
-        let cameras = self.cameras()?.into_iter();
-        let camera = cameras.filter(|c| c.serial == serial).next_back();
+        let mut cameras = self.cameras()?.into_iter();
+        let camera = cameras.find(|c| c.serial == serial);
         let mut nodes = camera.map(|c| self.nodes(&c)).unwrap_or_default();
         let color = file.lenses.color.unwrap_or(file.lenses.depth).intrinsics;
         let depth = file.lenses.depth.intrinsics;
