@@ -98,6 +98,9 @@ pub(crate) fn spawn(mut config: CameraConfig, key: CameraKey, ctx: Context, open
 
 /// Name of a source outside the box: of a recording the file name only.
 fn shown(source: &str) -> String {
+    if liveness(source) != Liveness::Patient {
+        return source.into();
+    }
     std::path::Path::new(source)
         .file_name()
         .map_or_else(|| source.into(), |n| n.to_string_lossy().into_owned())
@@ -173,11 +176,11 @@ impl Task {
     }
 
     async fn open(&self) -> Result<OpenSource, String> {
-        let (name, open) = (self.config.source.clone(), self.open);
-        match self.ctx.pool.run(move || open(&name)).await {
-            Ok(opened) => opened.map_err(|e| e.to_string()),
-            Err(e) => Err(e.to_string()),
-        }
+        let (config, open) = (self.config.clone(), self.open);
+        let opened = self.ctx.pool.run(move || open(&config)).await;
+        opened
+            .map_err(|e| e.to_string())?
+            .map_err(|e| e.to_string())
     }
 
     async fn start(&mut self) -> Result<v1::CameraInfo, Status> {
@@ -209,9 +212,10 @@ impl Task {
 
     /// Opens a device whenever it is there, with commands served meanwhile.
     fn await_device(&mut self) {
-        let name = self.config.source.clone();
+        let config = self.config.clone();
         let (calls, info) = (self.calls.clone(), self.info.clone());
-        self.awaited.begin(until_back(self.open, name, calls, info));
+        self.awaited
+            .begin(until_back(self.open, config, calls, info));
     }
 
     /// Reads a device that is back. A recording ends: its clock and calibration were those of before.

@@ -10,6 +10,7 @@ use tokio::sync::watch;
 use tokio::task::JoinHandle;
 use tokio::time::{Instant, sleep, timeout, timeout_at};
 use tryon_kit::compute::Pool;
+use tryon_kit::config::CameraConfig;
 use tryon_proto::v1::{self, CameraState};
 
 /// Shortest silence of a camera that is said.
@@ -27,8 +28,8 @@ const LONGEST_OPENING: Duration = Duration::from_secs(10);
 /// Most calls of a driver that hang before it isn't called any more.
 const MAX_HUNG: usize = 3;
 
-/// Opens a source by its name.
-pub(crate) type Open = fn(&str) -> Result<OpenSource, SourceError>;
+/// Opens the source of a camera.
+pub(crate) type Open = fn(&CameraConfig) -> Result<OpenSource, SourceError>;
 
 /// Expectation of a source's next frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -138,7 +139,11 @@ impl Drop for DriverCall {
 }
 
 /// Opens a device on a thread of its own; one that hangs is left to its driver.
-async fn try_open(open: Open, name: &str, calls: &DriverCalls) -> Result<OpenSource, String> {
+async fn try_open(
+    open: Open,
+    config: &CameraConfig,
+    calls: &DriverCalls,
+) -> Result<OpenSource, String> {
     // Nobody reads a device that is being opened.
     let hung = calls.count();
     if hung >= MAX_HUNG {
@@ -147,9 +152,9 @@ async fn try_open(open: Open, name: &str, calls: &DriverCalls) -> Result<OpenSou
         ));
     }
     let thread = Pool::background("opening").map_err(|e| e.to_string())?;
-    let (name, call) = (name.to_owned(), calls.begin());
+    let (config, call) = (config.clone(), calls.begin());
     let opening = thread.run(move || {
-        let opened = open(&name);
+        let opened = open(&config);
         drop(call);
         opened.map_err(|e| e.to_string())
     });
@@ -198,12 +203,12 @@ impl Awaited {
 /// Tries to open a device until it is back. The last failure is the camera's detail.
 pub(crate) async fn until_back(
     open: Open,
-    name: String,
+    config: CameraConfig,
     calls: DriverCalls,
     info: Arc<watch::Sender<v1::CameraInfo>>,
 ) -> OpenSource {
     loop {
-        match try_open(open, &name, &calls).await {
+        match try_open(open, &config, &calls).await {
             Ok(source) => return source,
             Err(why) => say_lost(&info, &why),
         }

@@ -30,10 +30,10 @@ const PERIOD: Duration = Duration::from_millis(33);
 /// Stand-in of a driver: frames at their pace while the device is present.
 struct Device(Pattern);
 
-fn open(name: &str) -> Result<OpenSource, SourceError> {
+fn open(config: &CameraConfig) -> Result<OpenSource, SourceError> {
     if DEVICE.load(Ordering::SeqCst) != PRESENT {
         return Err(SourceError {
-            source_name: name.into(),
+            source_name: config.source.clone(),
             why: "no such device".into(),
         });
     }

@@ -2,7 +2,7 @@
 
 use crate::camera::{self, Command, Handle};
 use crate::push;
-use crate::source::open;
+use crate::source::open_camera;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::time::Duration;
@@ -33,7 +33,7 @@ impl Capture {
         let spawn = |c: &tryon_kit::config::CameraConfig| {
             // Names were checked with the configuration.
             let key = CameraKey::new(&config.store, &c.name)?;
-            let handle = camera::spawn(c.clone(), key.clone(), ctx.clone(), open);
+            let handle = camera::spawn(c.clone(), key.clone(), ctx.clone(), open_camera);
             Some((c.name.clone(), (key, handle)))
         };
         Self {

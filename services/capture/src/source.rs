@@ -1,10 +1,12 @@
-//! Sources of a camera: `synth`, `pattern`, `push`, or a recording.
+//! Sources of a camera: `synth`, `pattern`, `push`, a device as `freenect:SERIAL`, or a recording.
 
 use crate::live::Liveness;
 use crate::pattern::Pattern;
 use crate::push::is_push;
 use std::path::Path;
-use tryon_formats::{RgbdSource, open_recording};
+use tryon_devices::{DeviceOptions, is_device};
+use tryon_formats::{CameraFile, RecordingOptions, RgbdSource, open_recording_with};
+use tryon_kit::config::CameraConfig;
 use tryon_synth::{Actor, Posture, Routine, Sequence, Setting, SynthSource};
 
 /// A source ready to be read.
@@ -25,6 +27,18 @@ pub struct SourceError {
 /// # Errors
 /// Names the source, and the file and field at fault.
 pub fn open(name: &str) -> Result<OpenSource, SourceError> {
+    open_camera(&CameraConfig {
+        source: name.into(),
+        ..CameraConfig::default()
+    })
+}
+
+/// Opens the source of a camera. A device may keep its thread waiting for seconds.
+///
+/// # Errors
+/// As [`open`].
+pub(crate) fn open_camera(config: &CameraConfig) -> Result<OpenSource, SourceError> {
+    let (name, camera) = (config.source.as_str(), config.camera_file());
     match kind(name)? {
         SourceKind::Pattern => Ok(Box::new(Pattern::new())),
         SourceKind::Synth(routine) => Ok(synth(routine)),
@@ -32,17 +46,20 @@ pub fn open(name: &str) -> Result<OpenSource, SourceError> {
             name,
             "runs while a program feeds it (PublishFrames)".into(),
         )),
-        SourceKind::Recording(path) => recording(name, path),
+        SourceKind::Device => device(name, camera),
+        SourceKind::Recording(path) => recording(name, path, camera),
     }
 }
 
-/// Checks a source by its configured name. Of a recording it reads as much as [`open`].
+/// Checks the source of a camera. Of a recording it reads as much as [`open`]; a device may be unplugged.
 ///
 /// # Errors
 /// As [`open`].
-pub(crate) fn check(name: &str) -> Result<(), SourceError> {
+pub(crate) fn check(config: &CameraConfig) -> Result<(), SourceError> {
+    let (name, camera) = (config.source.as_str(), config.camera_file());
     match kind(name)? {
-        SourceKind::Recording(path) => recording(name, path).map(drop),
+        SourceKind::Recording(path) => recording(name, path, camera).map(drop),
+        SourceKind::Device => check_device(name, camera),
         SourceKind::Pattern | SourceKind::Push | SourceKind::Synth(_) => Ok(()),
     }
 }
@@ -51,9 +68,18 @@ pub(crate) fn check(name: &str) -> Result<(), SourceError> {
 pub(crate) fn liveness(name: &str) -> Liveness {
     match kind(name) {
         Ok(SourceKind::Push) => Liveness::Said,
-
+        Ok(SourceKind::Device) => Liveness::Reopened,
         _ => Liveness::Patient,
     }
+}
+
+/// Warns of a missing library: it may be installed while this process runs.
+fn check_device(name: &str, camera: Option<&Path>) -> Result<(), SourceError> {
+    if let Err(why) = tryon_devices::check(name) {
+        tracing::warn!(source = name, %why, "the camera cannot be opened");
+    }
+    let read = camera.map(CameraFile::read).transpose();
+    read.map(drop).map_err(|e| fault(name, e.to_string()))
 }
 
 /// Kind of a source.
@@ -61,6 +87,7 @@ enum SourceKind<'a> {
     Pattern,
     Push,
     Synth(Routine),
+    Device,
     Recording(&'a Path),
 }
 
@@ -79,12 +106,31 @@ fn kind(name: &str) -> Result<SourceKind<'_>, SourceError> {
             let routine = routine(clip).map_err(|why| fault(name, why))?;
             Ok(SourceKind::Synth(routine))
         }
+        _ if is_device(name) => Ok(SourceKind::Device),
         _ => Ok(SourceKind::Recording(Path::new(name))),
     }
 }
 
-fn recording(name: &str, path: &Path) -> Result<OpenSource, SourceError> {
-    open_recording(path).map_err(|e| fault(name, e.to_string()))
+fn recording(name: &str, path: &Path, camera: Option<&Path>) -> Result<OpenSource, SourceError> {
+    let options = RecordingOptions {
+        camera: camera.map(Path::to_owned),
+        ..RecordingOptions::default()
+    };
+    open_recording_with(path, &options).map_err(|e| fault(name, e.to_string()))
+}
+
+fn device(name: &str, camera: Option<&Path>) -> Result<OpenSource, SourceError> {
+    let options = DeviceOptions {
+        camera: camera.map(Path::to_owned),
+    };
+    tryon_devices::open_with(name, &options).map_err(|e| {
+        // Most of a device's errors begin with its name.
+        let why = e.to_string();
+        let rest = why
+            .strip_prefix(name)
+            .and_then(|rest| rest.strip_prefix(": "));
+        fault(name, rest.map_or(why.clone(), str::to_owned))
+    })
 }
 
 /// `try-on` (the default), `leave`, `still`, `seated` or `empty`.
@@ -124,15 +170,35 @@ mod tests {
         let mut s = open("pattern").expect("always there");
         let f = s.next_frame().expect("fine").expect("never ends");
         assert_eq!(f.depth.width(), s.calibration().depth.width);
-        assert!(
-            ["pattern", "push", "synth", "synth:still"]
-                .iter()
-                .all(|s| check(s).is_ok())
-        );
-        for bad in ["synth:handstand", "/nowhere/at/all"] {
+        let check = |source: &str, camera: &str| {
+            check(&CameraConfig {
+                source: source.into(),
+                camera: camera.into(),
+                ..CameraConfig::default()
+            })
+        };
+        // Devices need not be plugged in.
+        let fine = [
+            "pattern",
+            "push",
+            "synth",
+            "synth:still",
+            "freenect:A1",
+            "openni",
+            "v4l2:7",
+        ];
+        assert!(fine.iter().all(|s| check(s, "").is_ok()));
+        for bad in ["synth:handstand", "/nowhere/at/all", "freenect:"] {
             let e = open(bad).err().expect("refused").to_string();
             assert!(e.starts_with(bad), "{e}");
-            assert_eq!(check(bad).expect_err("refused").to_string(), e);
+            assert_eq!(check(bad, "").expect_err("refused").to_string(), e);
         }
+        let e = check("v4l2:7", "/nowhere.json")
+            .expect_err("no file")
+            .to_string();
+        assert!(e.starts_with("v4l2:7: /nowhere.json"), "{e}");
+        let names = ["push", "v4l2", "synth", "v4l2.mcap"];
+        use Liveness::{Patient, Reopened, Said};
+        assert_eq!(names.map(liveness), [Said, Reopened, Patient, Patient]);
     }
 }

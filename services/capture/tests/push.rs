@@ -48,6 +48,7 @@ fn frame(number: u64) -> CameraFrame {
             .into(),
         color: [10u8, 20, 30].repeat(pixels as usize).into(),
         color_encoding: ColorEncoding::Bgr8.into(),
+        color_time_ns: 0,
     }
 }
 
