@@ -2,6 +2,7 @@
 
 use crate::consent::Leases;
 use crate::pace::Pace;
+use crate::push::is_push;
 use crate::recorder::Recorder;
 use crate::source::OpenSource;
 use std::sync::Arc;
@@ -107,7 +108,10 @@ impl Reader {
             if !pause.is_zero() {
                 self.flow.moves();
             }
-            pace.pause(pause);
+            // The clock of a camera that is fed goes on by itself.
+            if !is_push(&self.config.source) {
+                pace.pause(pause);
+            }
             let start = Instant::now();
             let frame = match self.read().await {
                 Ok(Some(f)) => f,
