@@ -1,9 +1,10 @@
 #!/usr/bin/env python3
 """The programs of examples/cameras, each run against a capture service and a device that needs no hardware: librealsense's
-software device and its recorder, libk4a's playback of a device's recording, OpenNI2's dummy device, and stand-ins of
-Orbbec's SDK and DepthAI. What the service records is read by PyPI's `mcap` and must be what the device showed.
+software device and its recorder, libk4a's playback of a device's recording, OpenNI2's dummy device, the playback of
+Orbbec's SDK, and a stand-in of DepthAI, whose pipelines want a device. What the service records is read by PyPI's `mcap` and must be what the device showed.
 
     apt-get install libopenni2-0 && pip install -r tests/clients/camera_sources/requirements.txt
+    pip install --no-deps pyorbbecsdk2  # The wheel asks for viewers that its module does without.
     python3 tests/clients/cameras.py [--bin target/debug] [--only realsense,k4a,openni,orbbec,depthai]
 
 Exit status 0 when every frame's depth is equal pixel for pixel, and every calibration to 1e-6."""
@@ -34,7 +35,8 @@ def run(family, binaries, folder):
     arguments = family.prepare(folder)
     environment = {**os.environ, **family.environment(folder), "PYTHONPATH": os.pathsep.join(path)}
     command = [sys.executable, str(EXAMPLES / family.program), "--address", service.address, *arguments]
-    program = subprocess.Popen(command, env=environment)
+    # Some SDKs leave a log where they run.
+    program = subprocess.Popen(command, env=environment, cwd=folder)
     try:
         service.begin_recording(LIMIT_S)
         if family.ends:

@@ -9,7 +9,8 @@ import numpy as np
 
 from . import scene
 
-SHARED = pathlib.Path(os.environ.get("TRYON_SHARED", pathlib.Path(__file__).resolve().parents[4] / "shared"))
+HERE = pathlib.Path(__file__).resolve().parent
+SHARED = pathlib.Path(os.environ.get("TRYON_SHARED", HERE.parents[3] / "shared"))
 LIBRARIES = pathlib.Path("/usr/lib/x86_64-linux-gnu")
 
 
@@ -116,6 +117,6 @@ ALL = [
     Family("realsense", scene.COUNT - 1, record_realsense, of_scene),
     Family("k4a", 1, lambda folder: ["--play", str(k4a_recording())], of_k4a),
     OpenNi(),
-    Family("orbbec", scene.COUNT, lambda folder: ["--play", "scene.bag"], of_scene),
+    Family("orbbec", scene.COUNT, lambda folder: ["--play", str(HERE / "orbbec.bag")], of_scene),
     Family("depthai", scene.COUNT, lambda folder: ["--play", "scene"], of_depthai),
 ]
