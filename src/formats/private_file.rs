@@ -23,6 +23,11 @@ pub(super) fn create(path: &Path) -> io::Result<File> {
     options().create(true).truncate(true).open(path)
 }
 
+/// Opens a file of its owner at its end.
+pub(super) fn append(path: &Path) -> io::Result<File> {
+    OpenOptions::new().append(true).open(path)
+}
+
 /// Writes a whole file.
 pub(super) fn write(path: &Path, bytes: &[u8]) -> io::Result<()> {
     create(path)?.write_all(bytes)

@@ -50,6 +50,9 @@ impl RgbdSource for Rectified {
         })?;
         Ok(Some(frame))
     }
+    fn skip_frame(&mut self) -> Result<bool, FormatError> {
+        self.source.skip_frame()
+    }
     fn rewind(&mut self) -> Result<(), FormatError> {
         self.source.rewind()
     }

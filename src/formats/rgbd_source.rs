@@ -33,6 +33,13 @@ pub trait RgbdSource: Send {
     /// # Errors
     /// Names the file and the field of this frame.
     fn next_frame(&mut self) -> Result<Option<RgbdFrame>, FormatError>;
+    /// Passes over a frame; false at the end. As [`Self::next_frame`], but its images need not be decoded.
+    ///
+    /// # Errors
+    /// As [`Self::next_frame`]; damage of images that are not decoded stays unnoticed.
+    fn skip_frame(&mut self) -> Result<bool, FormatError> {
+        Ok(self.next_frame()?.is_some())
+    }
     /// Returns to the first frame.
     ///
     /// # Errors

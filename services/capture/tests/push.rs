@@ -141,6 +141,11 @@ async fn frames_arrive_as_they_were_sent_and_only_while_somebody_may_see_them() 
     let path = folder.path().join(begun.into_inner().file);
     let mut recording = open_recording(&path).expect("readable");
     let first = recording.next_frame().expect("whole").expect("a frame");
+    assert_eq!(
+        first.time_ns,
+        frame(3).capture_time_ns,
+        "the camera's clock"
+    );
     assert_eq!(first.depth.at(0, 0), 1000, "2000 halves of a millimetre");
     assert_eq!(first.depth.at(5, 2), 1000 + 2 * 32 + 5);
     let [r, g, b] = first.color.expect("colour").at(3, 3).map(i32::from);

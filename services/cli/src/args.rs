@@ -9,7 +9,7 @@ mod token;
 
 pub(crate) use clothcap::{
     ClothcapAlignArgs, ClothcapArgs, ClothcapCaptureArgs, ClothcapRetargetArgs,
-    ClothcapSegmentArgs, ClothcapWhat, ScanArgs, ScanFrameArgs, Shard,
+    ClothcapSegmentArgs, ClothcapWhat, ScanArgs, Shard,
 };
 pub(crate) use fine::FineSessionArgs;
 pub(crate) use identity::{IdentityArgs, IdentityIssueArgs, IdentityMakeArgs, IdentityWhat};
@@ -65,9 +65,10 @@ pub(crate) enum Command {
     Composite(CompositeArgs),
     /// Garments from 3D scans of a person: align, segment, capture, and dress other bodies.
     Clothcap(ClothcapArgs),
-    /// Check a body, garment or recording made elsewhere and convert it to this product's own form.
+    /// Check a body, garment or recording made elsewhere and convert it to this product's own form. A conversion of a
+    /// recording that was stopped continues when it is started again.
     Import(ImportArgs),
-    /// Write the embedded body or a garment to OBJ, glTF or JSON.
+    /// Write the embedded body or a garment to OBJ, glTF or JSON, or a recording to MCAP for Foxglove and rerun.
     Export(ExportArgs),
     /// Record a source (the synthetic person, a folder, or a running camera node) to MCAP or a folder.
     Record(RecordArgs),
@@ -232,10 +233,12 @@ pub(crate) struct ImportArgs {
 
 #[derive(Debug, Args)]
 pub(crate) struct ExportArgs {
-    /// `body`, or a garment name.
-    #[arg(value_name = "WHAT", required_unless_present = "list")]
+    /// `body`, a garment name, or a recording.
+    #[arg(value_name = "WHAT|REC", required_unless_present = "list")]
     pub(crate) what: Option<String>,
-    /// .obj or .glb for meshes; .json for a garment's sewing pattern.
+    #[command(flatten)]
+    pub(crate) recording: RecordingArgs,
+    /// .obj or .glb for meshes; .json for a garment's sewing pattern; .mcap for a recording.
     #[arg(long, value_name = "FILE", required_unless_present = "list")]
     pub(crate) out: Option<PathBuf>,
     /// Garment size.

@@ -186,6 +186,10 @@ fn a_recording_or_scans_are_wanted_and_recordings_without_people_are_refused_by_
         capture(&["--input", "b", "--unit", "1"]).status.code(),
         Some(2)
     );
+    let topic = capture(&["--scans", "a", "--depth-topic", "/depth"]);
+    let err = String::from_utf8_lossy(&topic.stderr).into_owned();
+    assert_eq!(topic.status.code(), Some(2), "{err}");
+    assert!(err.contains("--input"), "{err}");
 
     let setting = Setting {
         routine: Routine::Empty,
@@ -204,4 +208,13 @@ fn a_recording_or_scans_are_wanted_and_recordings_without_people_are_refused_by_
         assert_eq!(done.status.code(), Some(1), "{err}");
         assert!(err.contains(reason) && !err.contains("panicked"), "{err}");
     }
+
+    // A recording without a calibration of its own takes one by option.
+    let camera = recording.join("camera.json");
+    std::fs::rename(&camera, folder.path().join("lens.json")).unwrap();
+    let without = capture(&["--input", &at("room")]);
+    assert!(String::from_utf8_lossy(&without.stderr).contains("camera.json"));
+    let with = capture(&["--input", &at("room"), "--camera", &at("lens.json")]);
+    let err = String::from_utf8_lossy(&with.stderr).into_owned();
+    assert!(err.contains("nobody is found"), "{err}");
 }

@@ -17,6 +17,8 @@ const COLOR: &str = "CALIBRATION_CameraLocationPV0";
 const BROWN_CONRADY: &str = "CALIBRATION_LensDistortionModelBrownConrady";
 /// Principal point (2), focal length (2), k₁ … k₆, centre of distortion (2), p₂, p₁.
 const PARAMETERS: usize = 14;
+/// Metric radius where the file states 0, for a fit that found none: the device's SDK takes the same.
+const DEFAULT_RADIUS: f64 = 1.7;
 /// Side of the depth sensor, pixels.
 const DEPTH_SENSOR: f64 = 1024.0;
 /// Largest deviation of a rotation's rows from orthonormal ones; the file has six digits.
@@ -162,6 +164,10 @@ impl SensorCamera {
             distortion: Distortion {
                 radial: [p[4], p[5], p[6], p[7], p[8], p[9]],
                 tangential: [p[13], p[12]],
+                limit: Some(
+                    metric_radius(&camera["MetricRadius"])
+                        .ok_or_else(|| fault("MetricRadius", "expected a radius of unit depth"))?,
+                ),
             },
             sensor: [side("SensorWidth")?, side("SensorHeight")?],
             rotation: rotation(&rows).ok_or_else(|| fault("Rt.Rotation", "no rotation"))?,
@@ -221,6 +227,16 @@ impl SensorCamera {
     }
 }
 
+/// Radius of rays, of unit depth, up to which the lens model holds: no pixel has a ray beyond.
+fn metric_radius(stated: &Value) -> Option<f64> {
+    let radius = match stated {
+        Value::Null => 0.0,
+        stated => stated.as_f64()?,
+    };
+    let is_radius = radius.is_finite() && radius >= 0.0;
+    is_radius.then_some(if radius > 0.0 { radius } else { DEFAULT_RADIUS })
+}
+
 /// Exactly `count` finite numbers.
 fn numbers(value: &Value, count: usize) -> Option<Vec<f64>> {
     let list = value.as_array().filter(|l| l.len() == count)?;
@@ -241,54 +257,5 @@ fn rotation(rows: &[f64]) -> Option<UnitQuaternion<f64>> {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// Table of the device's documentation: image, sensor of that scale, first row.
-    #[test]
-    fn modes_are_those_of_the_device() {
-        for (w, h, sensor_height, row) in [
-            (1280, 720, 960.0, 120.0),
-            (1920, 1080, 1440.0, 180.0),
-            (2560, 1440, 1920.0, 240.0),
-            (2048, 1536, 1536.0, 0.0),
-            (3840, 2160, 2880.0, 360.0),
-            (4096, 3072, 3072.0, 0.0),
-        ] {
-            let mode = color_mode(w, h).expect("a mode");
-            assert_eq!(
-                (mode.sensor, mode.crop),
-                ([f64::from(w), sensor_height], [0.0, row])
-            );
-        }
-        assert!(color_mode(640, 640).is_none() && depth_mode(640, 480).is_none());
-    }
-
-    /// A 16:9 calibration and the 4:3 one of the same camera give the same lens.
-    #[test]
-    fn early_files_state_the_middle_rows() {
-        let camera = |center, focal, height| SensorCamera {
-            center: [0.5, center],
-            focal: [0.48, focal],
-            distortion: Distortion::default(),
-            sensor: [4096.0, height],
-            rotation: UnitQuaternion::identity(),
-            translation: Vector3::zeros(),
-        };
-        let path = Path::new("x.mkv");
-        let mode = color_mode(1280, 720).expect("a mode");
-        // 1152 and 1966.08 pixels of 2304 rows; 1536 and 1966.08 of 3072.
-        let early = camera(0.5, 1966.08 / 2304.0, 2304.0).whole_sensor();
-        let early = early
-            .lens(path, mode, (1280, 720))
-            .expect("a lens")
-            .intrinsics;
-        let late = camera(0.5, 0.64, 3072.0).whole_sensor();
-        let late = late
-            .lens(path, mode, (1280, 720))
-            .expect("a lens")
-            .intrinsics;
-        assert!((early.fy - late.fy).abs() < 1e-9 && (early.cy - late.cy).abs() < 1e-9);
-        assert!((late.cy - 359.5).abs() < 1e-9 && (late.fy - 614.4).abs() < 1e-9);
-    }
-}
+#[path = "calibration_tests.rs"]
+mod tests;

@@ -14,4 +14,6 @@ mod reader;
 pub use reader::K4aReader;
 
 #[cfg(test)]
+mod metric_radius_tests;
+#[cfg(test)]
 mod tests;

@@ -305,6 +305,11 @@ impl RgbdSource for K4aReader {
             color,
         }))
     }
+    fn skip_frame(&mut self) -> Result<bool, FormatError> {
+        let is_there = self.next_pair()?.is_some();
+        self.next += u64::from(is_there);
+        Ok(is_there)
+    }
     fn rewind(&mut self) -> Result<(), FormatError> {
         self.scanner.rewind();
         self.pending = PendingFrames::new(self.timing);

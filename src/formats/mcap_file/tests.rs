@@ -201,3 +201,35 @@ fn false_lengths_and_noise_are_errors() {
         }
     }
 }
+
+/// A file cut anywhere and continued is the file of one writer, byte for byte.
+#[test]
+fn a_stopped_recording_continues() {
+    let dir = tempfile::tempdir().expect("temporary folder");
+    let calibration = Calibration {
+        color: Some(TINY),
+        ..Calibration::registered(TINY)
+    };
+    let frames: Vec<_> = (0..5).map(|i| frame(i, i != 3)).collect();
+    let path = written(dir.path(), &calibration, &frames);
+    let whole = fs::read(&path).expect("read");
+    let (part, next) = (dir.path().join("part.mcap"), dir.path().join("next.mcap"));
+    let mut most = 0;
+    for share in 0..64 {
+        let cut = 8 + share * (whole.len() - 8) / 63;
+        fs::write(&part, &whole[..cut]).expect("written");
+        let resumed = McapWriter::resume(&next, &part, &calibration, 4);
+        let mut writer = resumed.expect("resumes");
+        let there = writer.frames();
+        most = most.max(there);
+        let rest = &frames[there..];
+        rest.iter().for_each(|f| writer.write(f).expect("written"));
+        writer.finish().expect("finished");
+        assert!(
+            fs::read(&next).expect("read") == whole,
+            "cut at {cut}, {there} frames"
+        );
+        fs::remove_file(&next).expect("removed");
+    }
+    assert_eq!(most, 4, "no more than asked for");
+}

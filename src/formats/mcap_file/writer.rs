@@ -16,6 +16,14 @@ use tryon_geometry::camera::{Calibration, Intrinsics, RgbdFrame};
 /// JPEG quality of colour: 35 kB a VGA image.
 const JPEG_QUALITY: u8 = 85;
 
+const DEPTH: &str = "/camera/depth";
+const COLOR: &str = "/camera/color";
+/// Calibrations have a topic for each camera: viewers show the last message of a topic.
+const DEPTH_CALIBRATION: &str = "/camera/depth/calibration";
+/// See [`DEPTH_CALIBRATION`].
+const COLOR_CALIBRATION: &str = "/camera/color/calibration";
+const TRANSFORM: &str = "/tf";
+
 /// Frame of reference of the depth camera, and of colour registered to it.
 const DEPTH_FRAME: &str = "depth_camera";
 /// Frame of reference of a separate colour camera.
@@ -23,11 +31,26 @@ const COLOR_FRAME: &str = "color_camera";
 
 /// Channel numbers.
 #[derive(Clone, Copy, Debug)]
-struct Channels {
-    depth: u16,
+pub(super) struct Channels {
+    pub(super) depth: u16,
     color: u16,
-    calibration: u16,
+    depth_calibration: u16,
+    color_calibration: u16,
     transform: u16,
+}
+
+impl Channels {
+    /// Channel of a topic.
+    pub(super) fn of(&self, topic: &str) -> Option<u16> {
+        match topic {
+            DEPTH => Some(self.depth),
+            COLOR => Some(self.color),
+            DEPTH_CALIBRATION => Some(self.depth_calibration),
+            COLOR_CALIBRATION => Some(self.color_calibration),
+            TRANSFORM => Some(self.transform),
+            _ => None,
+        }
+    }
 }
 
 /// An MCAP recording being written. Every frame is flushed when [`McapWriter::write`] returns;
@@ -35,9 +58,9 @@ struct Channels {
 pub struct McapWriter {
     path: PathBuf,
     writer: Writer<BufWriter<File>>,
-    channels: Channels,
+    pub(super) channels: Channels,
     calibration: Calibration,
-    frames: u32,
+    pub(super) frames: u32,
 }
 
 /// Error of the system, such as a full disk, or of the format.
@@ -77,10 +100,11 @@ impl McapWriter {
             writer.add_channel(id, topic, "protobuf", &BTreeMap::new())
         };
         let channels = Channels {
-            depth: channel("/camera/depth", "RawImage").map_err(fault)?,
-            color: channel("/camera/color", "CompressedImage").map_err(fault)?,
-            calibration: channel("/camera/calibration", "CameraCalibration").map_err(fault)?,
-            transform: channel("/tf", "FrameTransform").map_err(fault)?,
+            depth: channel(DEPTH, "RawImage").map_err(fault)?,
+            color: channel(COLOR, "CompressedImage").map_err(fault)?,
+            depth_calibration: channel(DEPTH_CALIBRATION, "CameraCalibration").map_err(fault)?,
+            color_calibration: channel(COLOR_CALIBRATION, "CameraCalibration").map_err(fault)?,
+            transform: channel(TRANSFORM, "FrameTransform").map_err(fault)?,
         };
         Ok(Self {
             path: path.to_owned(),
@@ -96,7 +120,7 @@ impl McapWriter {
     }
 
     /// Writes a message.
-    fn put(
+    pub(super) fn put(
         &mut self,
         channel: u16,
         sequence: u32,
@@ -129,10 +153,10 @@ impl McapWriter {
             frame_id: frame.into(),
         };
         let depth = encode(&message(&self.calibration.depth, DEPTH_FRAME));
-        self.put(self.channels.calibration, 0, time_ns, &depth)?;
+        self.put(self.channels.depth_calibration, 0, time_ns, &depth)?;
         if let Some(k) = self.calibration.color {
             self.put(
-                self.channels.calibration,
+                self.channels.color_calibration,
                 0,
                 time_ns,
                 &encode(&message(&k, COLOR_FRAME)),
@@ -205,6 +229,11 @@ impl McapWriter {
             frame.time_ns,
             &encode(&message),
         )?;
+        self.end_frame()
+    }
+
+    /// Counts a frame and ends its chunk.
+    pub(super) fn end_frame(&mut self) -> Result<(), FormatError> {
         self.frames += 1;
         self.writer
             .flush()

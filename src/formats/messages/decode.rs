@@ -26,7 +26,7 @@ impl MessageKind {
             _ => return None,
         };
         let kind = RosKind::of(schema)?;
-        (!kind.is_of_sdk() || realsense::has_part(topic)).then_some(Self::Ros(wire, kind))
+        kind.has_part(topic).then_some(Self::Ros(wire, kind))
     }
     /// True for images, raw or compressed.
     pub(super) fn is_image(self) -> bool {

@@ -25,6 +25,8 @@ mod transforms;
 mod wire_reader;
 
 #[cfg(test)]
+mod librealsense_tests;
+#[cfg(test)]
 mod recorded_tests;
 #[cfg(test)]
 mod report_tests;

@@ -1,7 +1,8 @@
 //! Topics of the RealSense SDK's recorder: `/device_0/sensor_0/Depth_0/image/data`.
 //!
 //! Its headers name no frames of reference: a stream's prefix stands for its frame, and `PREFIX/tf/GROUP` holds the
-//! transform from the group's reference stream to the stream (librealsense, `ros_file_format.h`).
+//! transform from the group's reference stream to the stream (librealsense, `ros_file_format.h`). Since 2.58 it writes
+//! rosbag2 databases, whose headers name frames; their options are texts.
 
 use super::message_item::MessageItem;
 
@@ -23,9 +24,14 @@ fn is_of_sdk(topic: &str) -> bool {
     topic.starts_with("/device_") && topic.contains("/sensor_")
 }
 
-/// True for topics whose `geometry_msgs/Transform` or `std_msgs/Float32` matters.
-pub(super) fn has_part(topic: &str) -> bool {
-    extrinsics(topic).is_some() || (is_of_sdk(topic) && normalized(topic).ends_with(OPTION))
+/// True for topics of a stream's extrinsics.
+pub(super) fn is_extrinsics(topic: &str) -> bool {
+    extrinsics(topic).is_some()
+}
+
+/// True for topics of metres of a unit of depth.
+pub(super) fn is_depth_unit(topic: &str) -> bool {
+    is_of_sdk(topic) && normalized(topic).ends_with(OPTION)
 }
 
 /// Frame of a stream's images and cameras; `None` for topics of others.
@@ -81,9 +87,9 @@ mod tests {
 
     #[test]
     fn topics_of_the_sdk_are_told_from_others() {
-        assert!(has_part("/device_0/sensor_0/Depth_0/tf/0"));
-        assert!(has_part("/device_0/sensor_0/option/Depth Units/value"));
-        assert!(!has_part("/device_0/sensor_0/option/Gain/value") && !has_part("/tf/0"));
+        assert!(is_extrinsics("/device_0/sensor_0/Depth_0/tf/0") && !is_extrinsics("/tf/0"));
+        assert!(is_depth_unit("/device_0/sensor_0/option/Depth Units/value"));
+        assert!(!is_depth_unit("/device_0/sensor_0/option/Gain/value"));
         let depth = "/device_0/sensor_0/Depth_0/image/data";
         assert!(is_image_topic(depth) && !is_image_topic("/camera/image/data"));
         assert!(is_same_sensor(

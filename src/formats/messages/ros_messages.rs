@@ -5,6 +5,7 @@ use super::fault::MessageFault;
 use super::image_layout::ImageLayout;
 use super::image_message::ImageMessage;
 use super::message_item::MessageItem;
+use super::realsense;
 use super::transforms::{FrameEdge, pose};
 use super::wire_reader::{RosWire, WireReader};
 
@@ -26,6 +27,8 @@ pub(crate) enum RosKind {
     Extrinsics,
     /// `std_msgs/Float32`: an option in a bag of the RealSense SDK.
     Number,
+    /// `std_msgs/String`: an option in a database of the RealSense SDK.
+    NumberText,
 }
 
 impl RosKind {
@@ -41,6 +44,7 @@ impl RosKind {
             ("tf2_msgs", "TFMessage") | ("tf", "tfMessage") => Self::Transforms,
             ("geometry_msgs", "Transform") => Self::Extrinsics,
             ("std_msgs", "Float32") => Self::Number,
+            ("std_msgs", "String") => Self::NumberText,
             _ => return None,
         })
     }
@@ -48,9 +52,13 @@ impl RosKind {
     pub(super) fn is_image(self) -> bool {
         matches!(self, Self::Image | Self::CompressedImage)
     }
-    /// True for types that have a part only under the topics of the RealSense SDK.
-    pub(super) fn is_of_sdk(self) -> bool {
-        matches!(self, Self::Extrinsics | Self::Number)
+    /// True where messages of the type under a topic have a part in RGBD frames.
+    pub(super) fn has_part(self, topic: &str) -> bool {
+        match self {
+            Self::Extrinsics => realsense::is_extrinsics(topic),
+            Self::Number | Self::NumberText => realsense::is_depth_unit(topic),
+            _ => true,
+        }
     }
 }
 
@@ -79,7 +87,13 @@ pub(super) fn decode(
             }])
         }
         RosKind::Number => MessageItem::DepthUnit(f64::from(r.f32("data")?)),
+        RosKind::NumberText => MessageItem::DepthUnit(number(r.text("data")?)?),
     })
+}
+
+fn number(text: &str) -> Result<f64, MessageFault> {
+    let why = |_| MessageFault::new("data", format!("`{text}`, expected a number"));
+    text.trim().parse().map_err(why)
 }
 
 /// `std_msgs/Header`.

@@ -189,6 +189,11 @@ impl RgbdSource for R3dReader {
             color,
         }))
     }
+    fn skip_frame(&mut self) -> Result<bool, FormatError> {
+        let is_there = self.next < self.frames.len();
+        self.next += usize::from(is_there);
+        Ok(is_there)
+    }
     fn rewind(&mut self) -> Result<(), FormatError> {
         self.next = 0;
         Ok(())

@@ -74,6 +74,7 @@ impl PublishedCamera {
             distortion: Distortion {
                 radial: [k1, k2, k3, 0.0, 0.0, 0.0],
                 tangential: self.tangential,
+                limit: None,
             },
         };
         CameraFile {

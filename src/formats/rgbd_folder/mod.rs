@@ -6,6 +6,7 @@ mod index;
 mod names;
 mod pairing;
 mod reader;
+mod resume;
 mod writer;
 
 pub use camera_json::CameraFile;

@@ -201,6 +201,11 @@ impl RgbdSource for RgbdFolder {
         self.next += 1;
         self.read_frame(entry, sequence as u64).map(Some)
     }
+    fn skip_frame(&mut self) -> Result<bool, FormatError> {
+        let is_there = self.next < self.entries.len();
+        self.next += usize::from(is_there);
+        Ok(is_there)
+    }
     fn rewind(&mut self) -> Result<(), FormatError> {
         self.next = 0;
         Ok(())

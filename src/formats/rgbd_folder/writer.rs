@@ -19,10 +19,10 @@ fn write(path: &Path, bytes: &[u8]) -> Result<(), FormatError> {
 /// An RGBD folder being written: each frame is on disk when [`RgbdFolderWriter::write`] returns.
 #[derive(Debug)]
 pub struct RgbdFolderWriter {
-    folder: PathBuf,
-    depth_list: File,
-    color_list: Option<File>,
-    frames: usize,
+    pub(super) folder: PathBuf,
+    pub(super) depth_list: File,
+    pub(super) color_list: Option<File>,
+    pub(super) frames: usize,
 }
 
 impl RgbdFolderWriter {

@@ -15,6 +15,9 @@ pub struct Distortion {
     pub radial: [f64; 6],
     /// p₁, p₂.
     pub tangential: [f64; 2],
+    /// Radius of rays √((x/z)² + (y/z)²) up to which the maker vouches for the coefficients; `None` if it states none.
+    #[serde(default)]
+    pub limit: Option<f64>,
 }
 
 /// Coefficients that are no distortion.
@@ -58,10 +61,11 @@ impl Distortion {
         Ok(Self {
             radial: [k1, k2, k3, k4, k5, k6],
             tangential: [p1, p2],
+            limit: None,
         })
     }
 
-    /// True if a lens with it is a pinhole.
+    /// True if a lens with it is a pinhole that draws every ray.
     pub fn is_none(&self) -> bool {
         *self == Self::default()
     }

@@ -14,7 +14,8 @@ const TOLERANCE_SQUARED: f64 = 1e-24;
 const START: f64 = 0.9;
 
 impl Distortion {
-    /// Radius of rays √((x/z)² + (y/z)²) up to which the drawn radius r f(r²) grows; infinite if it always does.
+    /// Radius of rays √((x/z)² + (y/z)²) up to which the drawn radius r f(r²) grows, at most [`Distortion::limit`];
+    /// infinite without either.
     ///
     /// Rays beyond are drawn over others by the formula, but by no glass. With f = N / D, the derivative of the drawn
     /// radius has the sign of Σ nᵢ dⱼ (1 + 2(i − j)) sⁱ⁺ʲ, s = r², up to the pole D = 0.
@@ -30,7 +31,8 @@ impl Distortion {
         let first = |p: &[f64]| roots(p, MAX_RADIUS_SQUARED).first().copied();
         let fold = first(&growth).unwrap_or(f64::INFINITY);
         let pole = first(&d).unwrap_or(f64::INFINITY);
-        fold.min(pole).sqrt()
+        let limit = self.limit.unwrap_or(f64::INFINITY);
+        fold.min(pole).sqrt().min(limit)
     }
 
     /// Ray of unit depth (x / z, y / z) that is drawn at `drawn`: the inverse of [`Distortion::distort`].
@@ -329,7 +331,7 @@ mod tests {
             angle in 0.0f64..std::f64::consts::TAU,
             share in 0.0f64..0.9,
         ) {
-            let d = Distortion { radial: k, tangential: p };
+            let d = Distortion { radial: k, tangential: p, limit: None };
             let r = share * d.valid_radius().min(1.5);
             let ray = [r * angle.cos(), r * angle.sin()];
             prop_assume!(d.is_drawn(d.valid_radius(), ray));
@@ -345,7 +347,7 @@ mod tests {
             k in prop::array::uniform6(-2.0f64..2.0),
             drawn in prop::array::uniform2(-2.0f64..2.0),
         ) {
-            let d = Distortion { radial: k, tangential: [0.001, -0.002] };
+            let d = Distortion { radial: k, tangential: [0.001, -0.002], limit: None };
             if let Some(ray) = d.undistort(drawn) {
                 let [x, y] = d.distort(ray);
                 prop_assert!((x - drawn[0]).hypot(y - drawn[1]) < 1e-11);

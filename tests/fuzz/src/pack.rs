@@ -5,7 +5,7 @@ use gltf::binary::{Glb, Header};
 use mcap::records::MessageHeader;
 use mcap::{MessageStream, WriteOptions};
 use std::collections::BTreeMap;
-use std::io::{Cursor, Write};
+use std::io::{Cursor, Read, Write};
 use zip::write::FileOptions;
 use zip::{CompressionMethod, ZipWriter};
 
@@ -24,6 +24,19 @@ pub(crate) fn zip(members: &[Member]) -> Result<Vec<u8>, String> {
     }
     let done = archive.finish().map_err(|e| e.to_string())?;
     Ok(done.into_inner())
+}
+
+/// Members of a ZIP archive, but folders.
+pub(crate) fn unpack_zip(archive: &[u8]) -> Option<Bundle> {
+    let mut archive = zip::ZipArchive::new(Cursor::new(archive)).ok()?;
+    let mut bundle = Bundle::default();
+    for i in 0..archive.len() {
+        let mut entry = archive.by_index(i).ok()?;
+        let mut bytes = Vec::new();
+        entry.read_to_end(&mut bytes).ok()?;
+        bundle = bundle.and(&entry.name().to_owned(), bytes);
+    }
+    Some(bundle)
 }
 
 /// Binary glTF of a JSON and a binary chunk.

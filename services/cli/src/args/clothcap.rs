@@ -1,5 +1,6 @@
 //! Flags of `tryon clothcap`.
 
+use crate::recording::RecordingArgs;
 use clap::{Args, Subcommand, ValueEnum};
 use std::path::PathBuf;
 
@@ -101,14 +102,17 @@ pub(crate) struct ClothcapSegmentArgs {
 
 #[derive(Debug, Args)]
 #[command(group(clap::ArgGroup::new("source").required(true).args(["scans", "input"])))]
+#[command(mut_group("RecordingArgs", |g| g.requires("input")))]
 pub(crate) struct ClothcapCaptureArgs {
     /// A scan (.ply, .obj, .glb, .gltf), or a folder of them: a sequence.
     #[arg(long, value_name = "DIR|FILE")]
     pub(crate) scans: Option<PathBuf>,
-    /// A recording (MCAP or a folder) of one colour and depth camera before which the subject turns around once; one frame
+    /// A recording (any that `tryon run` reads) of one colour and depth camera before which the subject turns around once; one frame
     /// gives what it shows, completed from the body.
     #[arg(long, value_name = "REC", conflicts_with = "unit")]
     pub(crate) input: Option<PathBuf>,
+    #[command(flatten)]
+    pub(crate) recording: RecordingArgs,
     #[command(flatten)]
     pub(crate) frame: ScanFrameArgs,
     /// Garments worn, as for segment; without it they are found.

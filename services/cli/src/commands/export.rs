@@ -1,5 +1,6 @@
-//! `tryon export`: the embedded body or a garment to a file.
+//! `tryon export`: the embedded body, a garment or a recording to a file.
 
+use super::convert::convert;
 use crate::args::ExportArgs;
 use anyhow::{Context, Result, bail};
 use std::path::Path;
@@ -16,7 +17,8 @@ use tryon::synth::{Actor, Sequence, Setting};
 /// Runs the command.
 ///
 /// # Errors
-/// An unknown name or size, an ending that says no format, or a file that cannot be written.
+/// An unknown name or size, an ending that says no format, a recording that cannot be read, or a file that cannot be
+/// written.
 pub(crate) fn run(args: &ExportArgs) -> Result<ExitCode> {
     if args.list {
         println!("body");
@@ -26,7 +28,9 @@ pub(crate) fn run(args: &ExportArgs) -> Result<ExitCode> {
     let (Some(what), Some(out)) = (&args.what, &args.out) else {
         bail!("say what to export and where to (--out)")
     };
-    if what == "body" {
+    if out.extension().is_some_and(|e| e == "mcap") {
+        convert(Path::new(what), &args.recording, Some(out))?;
+    } else if what == "body" {
         let t = embedded::template();
         let body = GlbMesh {
             name: "body",

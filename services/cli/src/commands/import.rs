@@ -1,12 +1,10 @@
 //! `tryon import`: bodies, garments and recordings of others, checked and converted.
 
-use super::{
-    export::{flat, write_mesh},
-    record::Sink,
-};
+use super::convert::convert;
+use super::export::{flat, write_mesh};
 use crate::args::ImportArgs;
 use crate::input;
-use anyhow::{Context, Result, bail, ensure};
+use anyhow::{Context, Result, bail};
 use std::path::Path;
 use std::process::ExitCode;
 use tryon::cloth::BendingResolution;
@@ -40,7 +38,9 @@ pub(crate) fn run(args: &ImportArgs) -> Result<ExitCode> {
         }
         "json" => json(args)?,
         "mhclo" => clothes(args)?,
-        e if e.is_empty() || RECORDING_EXTENSIONS.contains(&e) => recording(args)?,
+        e if e.is_empty() || RECORDING_EXTENSIONS.contains(&e) => {
+            convert(path, &args.recording, args.out.as_deref())?;
+        }
         other => bail!(
             "{}: .{other} is not known; bodies are .npz, garments .obj, .glb or .json, recordings a folder or one of .{}",
             path.display(),
@@ -200,49 +200,5 @@ fn json(args: &ImportArgs) -> Result<()> {
         }
         _ => write(args, name, &flat(&g), &g.render.faces, &g.render.uv)?,
     }
-    Ok(())
-}
-
-fn recording(args: &ImportArgs) -> Result<()> {
-    let mut source = args.recording.open(&args.input)?;
-    let mut sink = args
-        .out
-        .as_ref()
-        .map(|out| Sink::create(out, source.calibration()))
-        .transpose()?;
-    let bar = input::progress(source.len().map(|n| n as u64), "checking");
-    let mut bad = 0u64;
-    loop {
-        match source.next_frame() {
-            Ok(None) => break,
-            Ok(Some(frame)) => {
-                if let Some(sink) = &mut sink {
-                    sink.write(&frame)?;
-                }
-            }
-            Err(e) => {
-                bad += 1;
-                bar.suspend(|| eprintln!("tryon: {e}"));
-            }
-        }
-        bar.inc(1);
-    }
-    if let Some(sink) = sink {
-        sink.finish()?;
-    }
-    bar.finish_and_clear();
-    let k = source.calibration().depth;
-    println!(
-        "recording: {} frames, {bad} of them bad, {}×{}",
-        bar.position(),
-        k.width,
-        k.height
-    );
-    let frames = bar.position();
-    ensure!(
-        bad < frames.max(1),
-        "{}: no frame is readable",
-        args.input.display()
-    );
     Ok(())
 }

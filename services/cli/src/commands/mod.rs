@@ -2,6 +2,7 @@
 
 pub(crate) mod clothcap;
 pub(crate) mod composite;
+mod convert;
 pub(crate) mod demo;
 pub(crate) mod doctor;
 pub(crate) mod export;

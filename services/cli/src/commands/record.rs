@@ -47,6 +47,35 @@ impl Sink {
             calibration,
         )?)))
     }
+    /// An `.mcap` file that continues the first `frames` frames of `part`.
+    ///
+    /// # Errors
+    /// When it cannot be created, or `part` is no MCAP file.
+    pub(crate) fn resume_mcap(
+        path: &Path,
+        part: &Path,
+        calibration: &Calibration,
+        frames: usize,
+    ) -> Result<Self> {
+        let writer = McapWriter::resume(path, part, calibration, frames)?;
+        Ok(Self::Mcap(Box::new(writer)))
+    }
+    /// A folder, continued after its first `frames` frames.
+    ///
+    /// # Errors
+    /// When its lists cannot be read or written.
+    pub(crate) fn resume_folder(path: &Path, frames: usize) -> Result<Self> {
+        Ok(Self::Folder(Box::new(RgbdFolderWriter::resume(
+            path, frames,
+        )?)))
+    }
+    /// Frames written.
+    pub(crate) fn frames(&self) -> usize {
+        match self {
+            Self::Mcap(w) => w.frames(),
+            Self::Folder(w) => w.frames(),
+        }
+    }
     /// Adds a frame.
     ///
     /// # Errors

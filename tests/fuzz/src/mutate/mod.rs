@@ -51,9 +51,8 @@ impl Mutator<'_> {
         let extension = member.name.rsplit('.').next().unwrap_or_default();
         match extension {
             "pb" => self.message(&mut member.bytes, donor),
-            "bin" | "npy" | "png" | "jpg" | "jpeg" | "tdz" | "npz" | "glb" | "mcap" | "gz" => {
-                self.bytes(&mut member.bytes, donor);
-            }
+            "bin" | "npy" | "png" | "jpg" | "jpeg" | "tdz" | "npz" | "glb" | "mcap" | "gz"
+            | "bag" | "db3" | "mkv" | "r3d" | "depth" => self.bytes(&mut member.bytes, donor),
             _ => self.text(&mut member.bytes, donor),
         }
     }

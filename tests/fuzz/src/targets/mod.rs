@@ -1,6 +1,7 @@
 //! Decoders of outside data, each with seeds of its own.
 
 mod bodies;
+mod device_recordings;
 mod garments;
 mod images;
 mod meshes;
@@ -101,6 +102,9 @@ pub const TARGETS: &[Target] = &[
     recordings::BAG,
     recordings::SQLITE,
     recordings::FOLDER,
+    device_recordings::KINECT,
+    device_recordings::RECORD3D,
+    device_recordings::ARRAYS,
     secrets::TOKEN,
     secrets::SEALED,
     settings::CONFIG,

@@ -93,7 +93,8 @@ pub(super) const FOLDER: Target = Target::new(
 .words("width height fx cx depth_scale color color_from_depth translation rotation ..")
 .allow(1 << 20, 60_000);
 
-fn frames(path: &Path) -> Result<usize, String> {
+/// Reads the first frames of a recording; the count of their pixels.
+pub(super) fn frames(path: &Path) -> Result<usize, String> {
     let mut source = open_recording(path).map_err(text)?;
     let mut pixels = 0;
     for _ in 0..MOST_FRAMES {

@@ -103,7 +103,7 @@ fn print_unseen(regions: &[BodyRegion], scans: usize) {
 /// Scans of the command, or the one that is fused from its recording.
 fn opened(args: &ClothcapCaptureArgs, header: Option<&CaptureHeader>) -> Result<Scans> {
     let scans = match (&args.input, &args.scans) {
-        (Some(recording), _) => return turn::fused(recording, &args.frame, &args.out),
+        (Some(recording), _) => return turn::fused(recording, args),
         (None, scans) => scans.clone().context("neither --scans nor --input")?,
     };
     let scans = ScanArgs {

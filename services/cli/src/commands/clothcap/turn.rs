@@ -1,8 +1,9 @@
 //! Recording of one camera as a scan: tracked, fused, written to the output folder and found there again.
 
 use super::scans::Scans;
-use crate::args::ScanFrameArgs;
+use crate::args::ClothcapCaptureArgs;
 use crate::input;
+use crate::recording::RecordingArgs;
 use anyhow::{Context, Result, ensure};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
@@ -11,7 +12,6 @@ use tryon::body::Template;
 use tryon::clothcap::align::{AlignedBody, Start};
 use tryon::clothcap::scan::ScanFrame;
 use tryon::clothcap::turn::{FusedTurn, TurnConfig, TurnReport, TurnTracker, fuse};
-use tryon::formats::open_recording;
 use tryon::formats::scan::{PlyMesh, write_ply};
 
 /// Fused scan in the output folder, and the person in it.
@@ -23,6 +23,9 @@ const PERSON: &str = "turn.json";
 #[derive(Debug, Serialize, Deserialize)]
 struct TurnFile {
     recording: PathBuf,
+    /// Choices for it, as their `Debug` writes them.
+    #[serde(default)]
+    options: String,
     template: String,
     body: AlignedBody,
     error: f64,
@@ -33,22 +36,33 @@ struct TurnFile {
 ///
 /// # Errors
 /// A recording that cannot be read or shows nobody, named; or an output folder that holds another one.
-pub(super) fn fused(recording: &Path, args: &ScanFrameArgs, out: &Path) -> Result<Scans> {
-    let template = input::template(args.body.as_deref())?;
-    let (scan, person) = (out.join(SCAN), out.join(PERSON));
+pub(super) fn fused(recording: &Path, args: &ClothcapCaptureArgs) -> Result<Scans> {
+    let template = input::template(args.frame.body.as_deref())?;
+    let (scan, person) = (args.out.join(SCAN), args.out.join(PERSON));
+    let options = format!("{:?}", args.recording);
     if !person.exists() {
-        let turn = fuse_recording(recording, &template)
+        let turn = fuse_recording(recording, &args.recording, &template)
             .with_context(|| format!("{}", recording.display()))?;
-        write(recording, &template, &turn, [&scan, &person])?;
+        write_scan(&scan, &turn)?;
+        let file = TurnFile {
+            recording: recording.to_owned(),
+            options: options.clone(),
+            template: template.name().to_owned(),
+            body: turn.start.body,
+            error: turn.start.error,
+            report: turn.report,
+        };
+        // After the scan: a stopped write leaves no person.
+        crate::report::write(&person, &file)?;
     }
     let text =
         std::fs::read(&person).with_context(|| format!("cannot read {}", person.display()))?;
     let file: TurnFile = serde_json::from_slice(&text)
         .with_context(|| format!("{} is no fused turn", person.display()))?;
     ensure!(
-        file.recording == recording && file.template == template.name(),
-        "{} holds the capture of another recording or body",
-        out.display()
+        file.recording == recording && file.options == options && file.template == template.name(),
+        "{} holds the capture of another recording, of other options or another body",
+        args.out.display()
     );
     Ok(Scans {
         template,
@@ -63,8 +77,12 @@ pub(super) fn fused(recording: &Path, args: &ScanFrameArgs, out: &Path) -> Resul
     })
 }
 
-fn fuse_recording(recording: &Path, template: &Arc<Template>) -> Result<FusedTurn> {
-    let mut source = open_recording(recording)?;
+fn fuse_recording(
+    recording: &Path,
+    options: &RecordingArgs,
+    template: &Arc<Template>,
+) -> Result<FusedTurn> {
+    let mut source = options.open(recording)?;
     let bar = input::progress(source.len().map(|n| n as u64), "tracking");
     let mut tracker = TurnTracker::new(template.clone(), source.calibration().clone());
     while let Some(frame) = source.next_frame()? {
@@ -75,28 +93,14 @@ fn fuse_recording(recording: &Path, template: &Arc<Template>) -> Result<FusedTur
     Ok(fuse(template, &tracker.finish()?, &TurnConfig::default())?)
 }
 
-/// Writes the scan, then the person: a stopped write leaves no person.
-fn write(
-    recording: &Path,
-    template: &Template,
-    turn: &FusedTurn,
-    [scan, person]: [&Path; 2],
-) -> Result<()> {
+fn write_scan(path: &Path, turn: &FusedTurn) -> Result<()> {
     let mesh = PlyMesh {
         points: &turn.scan.points,
         normals: &turn.scan.normals,
         colors: &turn.scan.colors,
         ..PlyMesh::default()
     };
-    write_ply(scan, &mesh)?;
-    let file = TurnFile {
-        recording: recording.to_owned(),
-        template: template.name().to_owned(),
-        body: turn.start.body.clone(),
-        error: turn.start.error,
-        report: turn.report.clone(),
-    };
-    crate::report::write(person, &file)
+    Ok(write_ply(path, &mesh)?)
 }
 
 /// Prints what no frame showed.
