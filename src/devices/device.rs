@@ -107,7 +107,15 @@ mod tests {
         assert_eq!(of("freenect"), Some(("freenect", None)));
         assert_eq!(of("openni:A:1"), Some(("openni", Some("A:1"))));
         assert_eq!(of("v4l2:0042"), Some(("v4l2", Some("0042"))));
-        for other in ["", "freenect:", "freenect2", "Freenect", "push", "/dev/video0", "ros2:/a,/b"] {
+        for other in [
+            "",
+            "freenect:",
+            "freenect2",
+            "Freenect",
+            "push",
+            "/dev/video0",
+            "ros2:/a,/b",
+        ] {
             assert_eq!(of(other), None, "{other}");
         }
     }

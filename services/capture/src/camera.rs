@@ -5,11 +5,12 @@ use crate::push::{Feed, Newest, is_push};
 use crate::reader::Reader;
 use crate::recorder::{Recorder, Recording};
 use crate::source::{OpenSource, open};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use tokio::sync::{mpsc, oneshot, watch};
 use tokio_util::sync::CancellationToken;
 use tonic::Status;
+use tryon_formats::Reoriented;
 use tryon_geometry::camera::Calibration;
 use tryon_kit::compute::Pool;
 use tryon_kit::config::CameraConfig;
@@ -142,9 +143,15 @@ impl Task {
     async fn open(&self) -> Result<OpenSource, String> {
         let name = self.config.source.clone();
         match self.ctx.pool.run(move || open(&name)).await {
-            Ok(opened) => opened.map_err(|e| e.to_string()),
+            Ok(opened) => opened.map(|s| self.upright(s)).map_err(|e| e.to_string()),
             Err(e) => Err(e.to_string()),
         }
+    }
+
+    /// The source with its pictures set upright as the camera is mounted.
+    fn upright(&self, source: OpenSource) -> OpenSource {
+        let name = Path::new(&self.config.source);
+        Reoriented::wrap(name, source, self.config.mounting())
     }
 
     async fn start(&mut self) -> Result<v1::CameraInfo, Status> {
@@ -181,7 +188,8 @@ impl Task {
             device => format!("{}: {device}", self.config.source),
         };
         self.info.send_modify(|i| i.source = source);
-        self.read(feed.source, Some(feed.newest)).await
+        let upright = self.upright(feed.source);
+        self.read(upright, Some(feed.newest)).await
     }
 
     /// Reads a source under a new epoch.

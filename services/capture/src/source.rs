@@ -35,6 +35,17 @@ pub fn open(name: &str) -> Result<OpenSource, SourceError> {
     }
 }
 
+/// True for the path of a recording, whether it is there or not.
+pub fn is_recording(name: &str) -> bool {
+    matches!(kind(name), Ok(SourceKind::Recording(_)))
+}
+
+/// True for a source whose frames come at their own time: neither a recording nor made by this program.
+pub fn is_live(name: &str) -> bool {
+    use SourceKind::{Pattern, Recording, Synth};
+    kind(name).is_ok_and(|k| !matches!(k, Pattern | Recording(_) | Synth(_)))
+}
+
 /// Checks a source by its configured name. Of a recording it reads as much as [`open`].
 ///
 /// # Errors
@@ -119,6 +130,9 @@ mod tests {
                 .iter()
                 .all(|s| check(s).is_ok())
         );
+        let names = ["push", "synth", "/nowhere/at/all", "synth:handstand"];
+        assert_eq!(names.map(is_live), [true, false, false, false]);
+        assert_eq!(names.map(is_recording), [false, false, true, false]);
         for bad in ["synth:handstand", "/nowhere/at/all"] {
             let e = open(bad).err().expect("refused").to_string();
             assert!(e.starts_with(bad), "{e}");

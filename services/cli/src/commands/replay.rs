@@ -42,6 +42,7 @@ pub(crate) fn run(args: &ReplayArgs) -> Result<ExitCode> {
         fast: args.fast,
         looped: args.repeat,
         autostart: true,
+        ..CameraConfig::default()
     }];
     let runtime = tokio::runtime::Builder::new_multi_thread()
         .enable_all()
