@@ -108,7 +108,7 @@ mod tests {
 
         let glass = found(Routine::Empty, |f, _| {
             punch(f, [90; 3], |u, v| {
-                (200..400).contains(&u) && (100..340).contains(&v)
+                (200..400).contains(&u) && (120..220).contains(&v)
             });
         });
         assert_eq!(of(&glass, "sunlight").0, Rating::Good);
