@@ -27,6 +27,16 @@ impl Family {
             Self::V4l2 => "v4l2",
         }
     }
+
+    /// File that the family needs, and the Debian package that has it.
+    pub(crate) const fn library(self) -> (&'static str, &'static str) {
+        match self {
+            Self::Freenect => ("libfreenect.so.0.5", "libfreenect0.5"),
+            Self::Openni => ("libOpenNI2.so.0", "libopenni2-0"),
+            // The kernel's own; a box without the module has no such class.
+            Self::V4l2 => ("/sys/class/video4linux", "linux-image-amd64"),
+        }
+    }
 }
 
 impl fmt::Display for Family {
@@ -42,6 +52,16 @@ pub enum Stream {
     Depth,
     /// Colour.
     Color,
+}
+
+impl Stream {
+    /// `depth` or `color`.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Depth => "depth",
+            Self::Color => "color",
+        }
+    }
 }
 
 /// Image size and rate that a camera offers.
@@ -62,7 +82,7 @@ pub struct Mode {
 pub struct Device {
     /// Library that drives it.
     pub family: Family,
-    /// Serial number; where a camera tells none, the place it is plugged in.
+    /// Serial number; of a camera that states none, its place on the bus.
     pub serial: String,
     /// Model, for people.
     pub name: String,
@@ -71,7 +91,7 @@ pub struct Device {
 }
 
 /// Cameras of a family.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub struct FamilyReport {
     /// The family.
     pub family: Family,
@@ -82,7 +102,7 @@ pub struct FamilyReport {
 /// Choices of whoever opens a camera.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct DeviceOptions {
-    /// A `camera.json` in place of the camera's own calibration; cameras by `v4l2` tell none and need it.
+    /// A `camera.json` in place of the camera's own calibration. Cameras by `v4l2` state none and need it.
     pub camera: Option<PathBuf>,
 }
 
@@ -97,6 +117,34 @@ pub(crate) fn parse(source: &str) -> Option<(Family, Option<&str>)> {
     Some((family, serial))
 }
 
+/// Source of one camera, `FAMILY:SERIAL`.
+pub(crate) fn source_name(family: Family, serial: &str) -> String {
+    format!("{family}:{serial}")
+}
+
+/// Serial number to open among those present: the one asked for, or the only one.
+///
+/// # Errors
+/// None of that number, none at all, or several without one asked for.
+pub(crate) fn choose(
+    family: Family,
+    serial: Option<&str>,
+    present: &[String],
+) -> Result<String, DeviceError> {
+    let fault = |camera: String, why| DeviceError::Absent {
+        camera,
+        why,
+        present: present.to_vec(),
+    };
+    match (serial, present) {
+        (Some(s), _) if present.iter().any(|p| p == s) => Ok(s.to_owned()),
+        (Some(s), _) => Err(fault(source_name(family, s), "not plugged in")),
+        (None, [only]) => Ok(only.clone()),
+        (None, []) => Err(fault(family.to_string(), "not plugged in")),
+        (None, _) => Err(fault(family.to_string(), "choose one by its serial number")),
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -107,7 +155,7 @@ mod tests {
         assert_eq!(of("freenect"), Some(("freenect", None)));
         assert_eq!(of("openni:A:1"), Some(("openni", Some("A:1"))));
         assert_eq!(of("v4l2:0042"), Some(("v4l2", Some("0042"))));
-        for other in [
+        let others = [
             "",
             "freenect:",
             "freenect2",
@@ -115,8 +163,31 @@ mod tests {
             "push",
             "/dev/video0",
             "ros2:/a,/b",
-        ] {
+        ];
+        for other in others {
             assert_eq!(of(other), None, "{other}");
         }
+    }
+
+    #[test]
+    fn a_camera_is_chosen_by_its_number_and_faults_list_those_present() {
+        let two = ["A1".to_owned(), "B2".to_owned()];
+        let of = |serial, present: &[String]| {
+            choose(Family::Openni, serial, present).map_err(|e| e.to_string())
+        };
+        assert_eq!(of(Some("B2"), &two), Ok("B2".into()));
+        assert_eq!(of(None, &two[..1]), Ok("A1".into()));
+        let fault = of(Some("C3"), &two).expect_err("absent");
+        assert_eq!(fault, "openni:C3: not plugged in; plugged in: A1, B2");
+        let fault = of(None, &two).expect_err("two");
+        assert_eq!(
+            fault,
+            "openni: choose one by its serial number; plugged in: A1, B2"
+        );
+        let fault = of(None, &[]).expect_err("none");
+        assert_eq!(
+            fault,
+            "openni: not plugged in; no camera of this family is plugged in"
+        );
     }
 }

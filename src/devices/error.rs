@@ -1,12 +1,14 @@
 //! Faults of cameras, each with its remedy.
 
-use super::Family;
+use super::{Family, Stream};
+use std::path::Path;
+use tryon_formats::FormatError;
 
 /// A camera that cannot be listed, opened or read.
-#[derive(Debug, thiserror::Error)]
+#[derive(Clone, Debug, thiserror::Error)]
 pub enum DeviceError {
-    /// The box lacks the family's library.
-    #[error("{family}: {library} is not installed ({why}); install it: apt-get install {package}")]
+    /// The box lacks the family's library, or it is none of the expected version.
+    #[error("{family}: {library} cannot be used ({why}); remedy: apt-get install {package}")]
     MissingLibrary {
         /// The family.
         family: Family,
@@ -23,23 +25,29 @@ pub enum DeviceError {
         /// As configured.
         source_name: String,
     },
-    /// No camera with the serial number is plugged in.
-    #[error("{family}:{serial}: not plugged in; {present}")]
+    /// No camera with the serial number is plugged in, or several without one asked for.
+    #[error("{camera}: {why}; {}", present_cameras(present))]
     Absent {
-        /// The family.
-        family: Family,
-        /// Serial number asked for; `*` for any.
-        serial: String,
-        /// Serial numbers that are there, as a sentence.
-        present: String,
+        /// `FAMILY:SERIAL`, or `FAMILY` for any.
+        camera: String,
+        /// Not plugged in, or one of several.
+        why: &'static str,
+        /// Serial numbers that are there.
+        present: Vec<String>,
     },
-    /// The driver refuses, or frames stop.
-    #[error("{family}:{serial}: `{field}`: {why}")]
+    /// A camera whose calibration is not known.
+    #[error("{camera}: `camera`: {why}")]
+    Calibration {
+        /// `FAMILY:SERIAL`.
+        camera: String,
+        /// The fault and the way around.
+        why: String,
+    },
+    /// The driver refuses, or the camera has gone.
+    #[error("{camera}: `{field}`: {why}")]
     Driver {
-        /// The family.
-        family: Family,
-        /// Serial number of the camera; `*` for the whole family.
-        serial: String,
+        /// `FAMILY:SERIAL`, or `FAMILY` for the driver itself.
+        camera: String,
         /// Call or stream at fault.
         field: &'static str,
         /// The fault.
@@ -47,19 +55,69 @@ pub enum DeviceError {
     },
 }
 
+fn present_cameras(serials: &[String]) -> String {
+    if serials.is_empty() {
+        "no camera of this family is plugged in".into()
+    } else {
+        format!("plugged in: {}", serials.join(", "))
+    }
+}
+
 impl DeviceError {
     /// The family's library is missing.
     pub(crate) fn missing(family: Family, why: String) -> Self {
-        let (library, package) = match family {
-            Family::Freenect => ("libfreenect.so.0.5", "libfreenect0.5"),
-            Family::Openni => ("libOpenNI2.so.0", "libopenni2-0"),
-            Family::V4l2 => ("/dev/video*", "linux-image-amd64"),
-        };
+        let (library, package) = family.library();
         Self::MissingLibrary {
             family,
             library,
             package,
             why,
+        }
+    }
+
+    /// A refusal of a driver.
+    pub(crate) fn driver(
+        camera: impl ToString,
+        field: &'static str,
+        why: impl Into<String>,
+    ) -> Self {
+        Self::Driver {
+            camera: camera.to_string(),
+            field,
+            why: why.into(),
+        }
+    }
+
+    /// A camera without a usable calibration.
+    pub(crate) fn calibration(camera: impl ToString, why: impl Into<String>) -> Self {
+        Self::Calibration {
+            camera: camera.to_string(),
+            why: why.into(),
+        }
+    }
+
+    /// Images of a stream stay away.
+    pub(crate) fn silent(
+        camera: impl ToString,
+        stream: Stream,
+        after: std::time::Duration,
+    ) -> Self {
+        let why = format!(
+            "no image for {:.1} s: has it been unplugged?",
+            after.as_secs_f64()
+        );
+        Self::driver(camera, stream.name(), why)
+    }
+}
+
+impl From<DeviceError> for FormatError {
+    fn from(e: DeviceError) -> Self {
+        let text = e.to_string();
+        match e {
+            DeviceError::Driver { camera, field, why } => {
+                Self::field(Path::new(&camera), field, why)
+            }
+            _ => Self::field(Path::new("camera"), "source", text),
         }
     }
 }

@@ -76,7 +76,7 @@ pub use r3d_file::R3dReader;
 pub use recording::{RECORDING_EXTENSIONS, RecordingOptions, open_recording, open_recording_with};
 pub use rectified::Rectified;
 pub use reoriented::Reoriented;
-pub use rgbd_folder::{RgbdFolder, RgbdFolderWriter, depth_to_mm, read_camera};
+pub use rgbd_folder::{CameraFile, RgbdFolder, RgbdFolderWriter, depth_to_mm, read_camera};
 pub use rgbd_source::RgbdSource;
 pub use shared_data::shared_data;
 pub use texture_points::TexturePoint;

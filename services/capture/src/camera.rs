@@ -4,7 +4,7 @@ use crate::consent::Leases;
 use crate::push::{Feed, Newest, is_push};
 use crate::reader::Reader;
 use crate::recorder::{Recorder, Recording};
-use crate::source::{OpenSource, open};
+use crate::source::{OpenSource, is_live, open_with};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use tokio::sync::{mpsc, oneshot, watch};
@@ -56,7 +56,7 @@ impl Handle {
 
 /// Starts the task of a camera; it ends with `ctx.shutdown`.
 pub(crate) fn spawn(mut config: CameraConfig, key: CameraKey, ctx: Context) -> Handle {
-    if is_push(&config.source) {
+    if is_live(&config.source) {
         // Its frames come at their pace, once.
         (config.fast, config.looped) = (true, false);
     }
@@ -91,6 +91,9 @@ pub(crate) fn spawn(mut config: CameraConfig, key: CameraKey, ctx: Context) -> H
 
 /// Name of a source outside the box: of a recording the file name only.
 fn shown(source: &str) -> String {
+    if is_live(source) {
+        return source.into();
+    }
     std::path::Path::new(source)
         .file_name()
         .map_or_else(|| source.into(), |n| n.to_string_lossy().into_owned())
@@ -141,11 +144,16 @@ impl Task {
     }
 
     async fn open(&self) -> Result<OpenSource, String> {
-        let name = self.config.source.clone();
-        match self.ctx.pool.run(move || open(&name)).await {
-            Ok(opened) => opened.map(|s| self.upright(s)).map_err(|e| e.to_string()),
-            Err(e) => Err(e.to_string()),
-        }
+        let config = self.config.clone();
+        // A device may take seconds, in which computations would wait.
+        let pool = if is_live(&config.source) {
+            Pool::background("open").map_err(|e| e.to_string())?
+        } else {
+            self.ctx.pool.clone()
+        };
+        let opened = pool.run(move || open_with(&config.source, config.camera_file()));
+        let source = opened.await.map_err(|e| e.to_string())?;
+        source.map(|s| self.upright(s)).map_err(|e| e.to_string())
     }
 
     /// The source with its pictures set upright as the camera is mounted.

@@ -25,7 +25,7 @@ pub fn check(config: &Config) -> Result<(), StartError> {
     }
     for (i, camera) in c.cameras.iter().enumerate() {
         let key = format!("capture.cameras.{i}.source");
-        source::check(&camera.source).map_err(|e| fault(key, e.to_string()))?;
+        source::check(camera).map_err(|e| fault(key, e.to_string()))?;
     }
     Ok(())
 }

@@ -1,9 +1,11 @@
-//! Sources of a camera: `synth`, `pattern`, `push`, or a recording.
+//! Sources of a camera: `synth`, `pattern`, `push`, a device as `freenect:SERIAL`, or a recording.
 
 use crate::pattern::Pattern;
 use crate::push::is_push;
 use std::path::Path;
-use tryon_formats::{RgbdSource, open_recording};
+use tryon_devices::{DeviceOptions, is_device};
+use tryon_formats::{CameraFile, RecordingOptions, RgbdSource, open_recording_with};
+use tryon_kit::config::CameraConfig;
 use tryon_synth::{Actor, Posture, Routine, Sequence, Setting, SynthSource};
 
 /// A source ready to be read.
@@ -24,6 +26,15 @@ pub struct SourceError {
 /// # Errors
 /// Names the source, and the file and field at fault.
 pub fn open(name: &str) -> Result<OpenSource, SourceError> {
+    open_with(name, None)
+}
+
+/// As [`open`]; `camera` is a `camera.json` for devices and recordings without a calibration of their own. A device may
+/// keep its thread waiting for seconds.
+///
+/// # Errors
+/// As [`open`].
+pub fn open_with(name: &str, camera: Option<&Path>) -> Result<OpenSource, SourceError> {
     match kind(name)? {
         SourceKind::Pattern => Ok(Box::new(Pattern::new())),
         SourceKind::Synth(routine) => Ok(synth(routine)),
@@ -31,7 +42,8 @@ pub fn open(name: &str) -> Result<OpenSource, SourceError> {
             name,
             "runs while a program feeds it (PublishFrames)".into(),
         )),
-        SourceKind::Recording(path) => recording(name, path),
+        SourceKind::Device => device(name, camera),
+        SourceKind::Recording(path) => recording(name, path, camera),
     }
 }
 
@@ -40,21 +52,31 @@ pub fn is_recording(name: &str) -> bool {
     matches!(kind(name), Ok(SourceKind::Recording(_)))
 }
 
-/// True for a source whose frames come at their own time: neither a recording nor made by this program.
+/// True for a source whose frames come once, at their own pace.
 pub fn is_live(name: &str) -> bool {
-    use SourceKind::{Pattern, Recording, Synth};
-    kind(name).is_ok_and(|k| !matches!(k, Pattern | Recording(_) | Synth(_)))
+    matches!(kind(name), Ok(SourceKind::Push | SourceKind::Device))
 }
 
-/// Checks a source by its configured name. Of a recording it reads as much as [`open`].
+/// Checks the source of a camera. Of a recording it reads as much as [`open`]; a device may be unplugged.
 ///
 /// # Errors
 /// As [`open`].
-pub(crate) fn check(name: &str) -> Result<(), SourceError> {
+pub(crate) fn check(config: &CameraConfig) -> Result<(), SourceError> {
+    let (name, camera) = (config.source.as_str(), config.camera_file());
     match kind(name)? {
-        SourceKind::Recording(path) => recording(name, path).map(drop),
+        SourceKind::Recording(path) => recording(name, path, camera).map(drop),
+        SourceKind::Device => check_device(name, camera),
         SourceKind::Pattern | SourceKind::Push | SourceKind::Synth(_) => Ok(()),
     }
+}
+
+/// Warns of a missing library: it may be installed while this process runs.
+fn check_device(name: &str, camera: Option<&Path>) -> Result<(), SourceError> {
+    if let Err(why) = tryon_devices::check(name) {
+        tracing::warn!(source = name, %why, "the camera cannot be opened");
+    }
+    let read = camera.map(CameraFile::read).transpose();
+    read.map(drop).map_err(|e| fault(name, e.to_string()))
 }
 
 /// Kind of a source.
@@ -62,6 +84,7 @@ enum SourceKind<'a> {
     Pattern,
     Push,
     Synth(Routine),
+    Device,
     Recording(&'a Path),
 }
 
@@ -80,12 +103,31 @@ fn kind(name: &str) -> Result<SourceKind<'_>, SourceError> {
             let routine = routine(clip).map_err(|why| fault(name, why))?;
             Ok(SourceKind::Synth(routine))
         }
+        _ if is_device(name) => Ok(SourceKind::Device),
         _ => Ok(SourceKind::Recording(Path::new(name))),
     }
 }
 
-fn recording(name: &str, path: &Path) -> Result<OpenSource, SourceError> {
-    open_recording(path).map_err(|e| fault(name, e.to_string()))
+fn recording(name: &str, path: &Path, camera: Option<&Path>) -> Result<OpenSource, SourceError> {
+    let options = RecordingOptions {
+        camera: camera.map(Path::to_owned),
+        ..RecordingOptions::default()
+    };
+    open_recording_with(path, &options).map_err(|e| fault(name, e.to_string()))
+}
+
+fn device(name: &str, camera: Option<&Path>) -> Result<OpenSource, SourceError> {
+    let options = DeviceOptions {
+        camera: camera.map(Path::to_owned),
+    };
+    tryon_devices::open_with(name, &options).map_err(|e| {
+        // Most of a device's errors begin with its name.
+        let why = e.to_string();
+        let rest = why
+            .strip_prefix(name)
+            .and_then(|rest| rest.strip_prefix(": "));
+        fault(name, rest.map_or(why.clone(), str::to_owned))
+    })
 }
 
 /// `try-on` (the default), `leave`, `still`, `seated` or `empty`.
@@ -125,18 +167,35 @@ mod tests {
         let mut s = open("pattern").expect("always there");
         let f = s.next_frame().expect("fine").expect("never ends");
         assert_eq!(f.depth.width(), s.calibration().depth.width);
-        assert!(
-            ["pattern", "push", "synth", "synth:still"]
-                .iter()
-                .all(|s| check(s).is_ok())
-        );
+        let check = |source: &str, camera: &str| {
+            check(&CameraConfig {
+                source: source.into(),
+                camera: camera.into(),
+                ..CameraConfig::default()
+            })
+        };
+        // Devices need not be plugged in.
+        let fine = [
+            "pattern",
+            "push",
+            "synth",
+            "synth:still",
+            "freenect:A1",
+            "openni",
+            "v4l2:7",
+        ];
+        assert!(fine.iter().all(|s| check(s, "").is_ok()));
         let names = ["push", "synth", "/nowhere/at/all", "synth:handstand"];
-        assert_eq!(names.map(is_live), [true, false, false, false]);
         assert_eq!(names.map(is_recording), [false, false, true, false]);
-        for bad in ["synth:handstand", "/nowhere/at/all"] {
+        for bad in ["synth:handstand", "/nowhere/at/all", "freenect:"] {
             let e = open(bad).err().expect("refused").to_string();
             assert!(e.starts_with(bad), "{e}");
-            assert_eq!(check(bad).expect_err("refused").to_string(), e);
+            assert_eq!(check(bad, "").expect_err("refused").to_string(), e);
         }
+        let e = check("v4l2:7", "/nowhere.json")
+            .expect_err("no file")
+            .to_string();
+        assert!(e.starts_with("v4l2:7: /nowhere.json"), "{e}");
+        assert!(is_live("push") && is_live("v4l2") && !is_live("synth") && !is_live("v4l2.mcap"));
     }
 }

@@ -1,8 +1,8 @@
 //! Cameras of this machine, a finding a family: what is plugged in, and what is missing.
 
 use serde::Serialize;
+use tryon::inspection::Finding;
 use tryon_devices::{Device, DeviceError, FamilyReport, Stream};
-use tryon_inspection::Finding;
 
 /// Cameras by the SDK of their maker, which is not in this program: another program feeds them.
 #[derive(Clone, Copy, Debug, Serialize)]
@@ -107,8 +107,8 @@ pub(crate) fn stream_name(stream: Stream) -> &'static str {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use tryon::inspection::Rating;
     use tryon_devices::{Family, Mode};
-    use tryon_inspection::Rating;
 
     fn report(devices: Result<Vec<Device>, DeviceError>) -> FamilyReport {
         FamilyReport {

@@ -2,7 +2,7 @@
 
 use anyhow::Result;
 use std::process::ExitCode;
-use tryon_inspection::{Finding, Rating};
+use tryon::inspection::{Finding, Rating};
 
 /// Prints findings, a line each.
 pub(crate) fn print(findings: &[Finding]) {

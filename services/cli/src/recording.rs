@@ -5,7 +5,6 @@ use clap::Args;
 use std::path::{Path, PathBuf};
 use tryon::formats::{FormatError, RecordingOptions, Reoriented, RgbdSource, open_recording_with};
 use tryon::geometry::camera::{Calibration, LensCalibration, Mounting, PictureTurn, RgbdFrame};
-use tryon_devices::DeviceOptions;
 
 /// Choices that a recording may leave to the reader.
 #[derive(Debug, Default, Args)]
@@ -54,13 +53,6 @@ impl RecordingArgs {
     /// Names the source and its fault.
     pub(crate) fn open_source(&self, name: &str) -> Result<Box<dyn RgbdSource>> {
         let path = Path::new(name);
-        if tryon_devices::is_device(name) {
-            let options = DeviceOptions {
-                camera: self.camera.clone(),
-            };
-            let source = tryon_devices::open_with(name, &options)?;
-            return Ok(self.prepared(path, source));
-        }
         if tryon_capture_service::is_recording(name) {
             let neither =
                 || format!("{name} is neither a camera (`tryon camera list`) nor a recording");
@@ -70,7 +62,8 @@ impl RecordingArgs {
                 self.open(path).with_context(neither)
             };
         }
-        Ok(self.prepared(path, tryon_capture_service::open(name)?))
+        let source = tryon_capture_service::open_with(name, self.camera.as_deref())?;
+        Ok(self.prepared(path, source))
     }
 
     /// The source set upright, its omissions told.

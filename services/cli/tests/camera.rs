@@ -1,6 +1,9 @@
 //! `tryon camera` from outside: its output, its pictures and its exit codes.
 #![allow(clippy::unwrap_used, missing_docs)]
 
+#[path = "../../../src/devices/tests/common/mod.rs"]
+mod replay;
+
 use serde_json::Value;
 use std::path::Path;
 use std::process::{Command, Output};
@@ -321,4 +324,58 @@ fn recordings_are_imported_upright_and_tracked_as_such() {
     assert_eq!(want.0, "tracking");
     // The same reflection sets it right: it swaps rows and columns.
     assert_eq!(joints(&aside, &["--turned", "270", "--mirrored"]), want);
+}
+
+/// The command in a process for which a recording of a Kinect is plugged in; `None` where the replay is missing.
+fn with_kinect(folder: &Path, args: &[&str]) -> Option<Output> {
+    let library = replay::replay_library()?;
+    let mut c = Command::new(env!("CARGO_BIN_EXE_tryon"));
+    c.args(args).env("XDG_RUNTIME_DIR", std::env::temp_dir());
+    c.env("LD_LIBRARY_PATH", library)
+        .env("FAKENECT_PATH", folder);
+    Some(c.output().expect("starts"))
+}
+
+#[test]
+fn a_camera_that_is_plugged_in_is_listed_shown_and_checked() {
+    let dir = tempfile::tempdir().unwrap();
+    // Ten seconds of 30 images each.
+    replay::write_recording(dir.path(), 6, 50, 7);
+    let Some(out) = with_kinect(dir.path(), &["camera", "list", "--json"]) else {
+        return;
+    };
+    let listed: Value = serde_json::from_slice(&out.stdout).unwrap();
+    let camera = &listed["families"][0]["cameras"][0];
+    let source = camera["source"].as_str().unwrap();
+    assert!(source.starts_with("freenect:"), "{listed:#}");
+    let modes = camera["modes"].as_array().unwrap();
+    let is_depth = |m: &&Value| m["stream"] == "depth" && m["width"] == 640;
+    assert!(modes.iter().any(|m| is_depth(&m)), "{listed:#}");
+    let doctor = with_kinect(dir.path(), &["doctor"]).unwrap();
+    assert!(
+        text(&doctor.stdout).contains(source),
+        "{}",
+        text(&doctor.stdout)
+    );
+
+    let args = ["camera", "check", source, "--seconds", "1.5", "--json"];
+    let out = with_kinect(dir.path(), &args).unwrap();
+    let checked: Value = serde_json::from_slice(&out.stdout).unwrap();
+    let measured = &checked["measured"];
+    // Live frames have a time of arrival; the replay leaves every eleventh pixel without depth.
+    assert!(
+        measured["timing"]["delay_spread"].is_number(),
+        "{measured:#}"
+    );
+    let rate = measured["timing"]["rate"].as_f64().unwrap();
+    assert!((5.0..31.0).contains(&rate), "{measured:#}");
+    let holes = measured["holes"]["middle"].as_f64().unwrap();
+    assert!((holes - 1.0 / 11.0).abs() < 0.01, "{measured:#}");
+
+    let path = dir.path().join("kinect.png").display().to_string();
+    let args = ["camera", "view", source, "--out", &path, "--turned", "90"];
+    let out = with_kinect(dir.path(), &args).unwrap();
+    assert!(out.status.success(), "{}", text(&out.stderr));
+    let picture = read_color(Path::new(&path)).unwrap();
+    assert_eq!((picture.width(), picture.height()), (480 + 4 + 480, 640));
 }

@@ -22,18 +22,21 @@ const UNIT_TOLERANCE: f64 = 1e-3;
 /// Fewest units in a metre that are a depth camera's, and most metres a unit: a decimetre.
 const COARSEST: f64 = 10.0;
 
-/// Lenses and the unit of the depth images.
+/// A `camera.json`: lenses and the unit of the depth images.
 #[derive(Clone, Debug)]
-pub(super) struct CameraFile {
+pub struct CameraFile {
     /// Both cameras, distortion included.
-    pub(super) lenses: LensCalibration,
+    pub lenses: LensCalibration,
     /// Units per metre.
-    pub(super) depth_scale: f64,
+    pub depth_scale: f64,
 }
 
 impl CameraFile {
     /// Reads and checks every field.
-    pub(super) fn read(path: &Path) -> Result<Self, FormatError> {
+    ///
+    /// # Errors
+    /// Names the file and the field at fault.
+    pub fn read(path: &Path) -> Result<Self, FormatError> {
         let bytes = read_limited(path, MAX_BYTES)?;
         // Python and Matlab write NaN and Infinity, which JSON lacks: the error names the field, not a column.
         let text = String::from_utf8_lossy(&bytes);

@@ -8,6 +8,7 @@ mod pairing;
 mod reader;
 mod writer;
 
+pub use camera_json::CameraFile;
 pub(crate) use reader::read_lenses;
 pub use reader::{RgbdFolder, depth_to_mm, read_camera};
 pub use writer::RgbdFolderWriter;

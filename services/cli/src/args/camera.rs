@@ -3,7 +3,7 @@
 use crate::recording::RecordingArgs;
 use clap::{Args, Subcommand, ValueEnum};
 use std::path::PathBuf;
-use tryon_inspection::SensorModel;
+use tryon::inspection::SensorModel;
 
 #[derive(Debug, Args)]
 pub(crate) struct CameraArgs {

@@ -6,7 +6,7 @@ use anyhow::Result;
 use std::net::TcpListener;
 use std::path::Path;
 use std::process::ExitCode;
-use tryon_inspection::{Finding, Rating};
+use tryon::inspection::{Finding, Rating};
 
 /// Runs the command. Exit code 1 when something will fail.
 ///

@@ -194,8 +194,11 @@ settings! {
     pub struct CameraConfig {
         /// Camera part of the bus keys.
         pub name: String = "front".into(),
-        /// `synth`, `synth:CLIP`, `pattern` (a test picture), `push` (a program feeds it), or the path of a recording.
+        /// `synth`, `synth:CLIP`, `pattern` (a test picture), `push` (a program feeds it), a device as `freenect:SERIAL`,
+        /// `openni:SERIAL` or `v4l2:SERIAL`, or the path of a recording.
         pub source: String = "synth".into(),
+        /// `camera.json` of a device or recording that has no calibration of its own; empty for its own.
+        pub camera: PathBuf = PathBuf::new(),
         /// Frames a second; 0 means the source's own rate.
         pub rate: f64 = 0.0,
         /// Ignore all rates and go as fast as possible.
@@ -304,6 +307,11 @@ impl CameraConfig {
             turned: self.turned,
             mirrored: self.mirrored,
         }
+    }
+
+    /// The given calibration, if any.
+    pub fn camera_file(&self) -> Option<&Path> {
+        Some(self.camera.as_path()).filter(|p| !p.as_os_str().is_empty())
     }
 }
 

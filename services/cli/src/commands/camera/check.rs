@@ -6,7 +6,7 @@ use crate::{findings, input};
 use anyhow::Result;
 use serde::Serialize;
 use std::process::ExitCode;
-use tryon_inspection::{
+use tryon::inspection::{
     Finding, FindingLimits, InspectionReport, InspectionSettings, Inspector, PersonSize, judge,
 };
 

@@ -40,8 +40,7 @@ impl Frames {
         ensure!(is_time, "--seconds: a positive number of seconds is needed");
         Ok(Self {
             source: from.recording.open_source(&from.source)?,
-            is_live: tryon_devices::is_device(&from.source)
-                || tryon_capture_service::is_live(&from.source),
+            is_live: tryon_capture_service::is_live(&from.source),
             seconds,
             interrupt: Interrupt::watch()?,
             begun: Instant::now(),

@@ -11,7 +11,7 @@ use std::process::ExitCode;
 use std::time::{Duration, Instant};
 use tryon::formats::image::write_png_rgb;
 use tryon::geometry::camera::RgbdFrame;
-use tryon_inspection::{DepthHistogram, FrameTimes, HoleShares, InspectionSettings};
+use tryon::inspection::{DepthHistogram, FrameTimes, HoleShares, InspectionSettings};
 
 /// Width of the picture in the terminal, characters.
 const COLUMNS: usize = 64;
