@@ -166,16 +166,12 @@ fn a_picture_shows_depth_beside_colour() {
 fn a_view_without_a_terminal_is_plain_text() {
     let printed = said(&["camera", "view", "synth:still", "--seconds", "2.1"]);
     assert!(!printed.contains('\x1b'), "{printed}");
-    let lines: Vec<&str> = printed
-        .lines()
-        .filter(|l| l.contains("frames a second"))
-        .collect();
+    let lines: Vec<&str> = printed.lines().filter(|l| l.contains("% holes")).collect();
     assert_eq!(lines.len(), 4, "{printed}");
+    assert!(lines[0].contains("first frame"), "{printed}");
     assert!(lines[3].starts_with("30.0 frames a second"), "{printed}");
-    assert!(
-        lines[3].contains("nearest 1.") || lines[3].contains("nearest 2."),
-        "{printed}"
-    );
+    // The floor at the picture's lower edge: 1 m below, 24.6° + 3° down.
+    assert!(lines[3].ends_with("nearest 2.00 m"), "{printed}");
     let rows: Vec<&str> = printed
         .lines()
         .filter(|l| l.chars().count() == 64)
@@ -321,7 +317,11 @@ fn recordings_are_imported_upright_and_tracked_as_such() {
         (last["status"].clone(), last["joints"].clone())
     };
     let want = joints(&upright, &[]);
-    assert_eq!(want.0, "tracking");
+    assert!(
+        want.0 == "calibrating" || want.0 == "tracking",
+        "{}",
+        want.0
+    );
     // The same reflection sets it right: it swaps rows and columns.
     assert_eq!(joints(&aside, &["--turned", "270", "--mirrored"]), want);
 }
