@@ -9,7 +9,8 @@
 //! Camera and files:
 //!
 //! - Recordings: [`mod@recording`], [`mod@rgbd_folder`], [`mod@k4a_file`], [`mod@r3d_file`], [`mod@npz_recording`];
-//!   messages ([`mod@messages`]) in [`mod@mcap_file`], [`mod@bag_file`] and [`mod@rosbag2`]; rectified: [`mod@rectified`].
+//!   messages ([`mod@messages`]) in [`mod@mcap_file`], [`mod@bag_file`] and [`mod@rosbag2`]; rectified: [`mod@rectified`];
+//!   set upright: [`mod@reoriented`].
 //! - Lossless depth compression: [`mod@image::depth_codec`].
 //! - Motion clips: [`mod@bvh`], [`mod@asf_amc`].
 //! - GlTF, OBJ, MakeHuman: [`mod@gltf`], [`mod@obj`], [`mod@mhclo`].
@@ -51,6 +52,7 @@ mod private_file;
 mod r3d_file;
 mod recording;
 mod rectified;
+mod reoriented;
 mod rgbd_folder;
 mod rgbd_source;
 mod rosbag2;
@@ -73,6 +75,7 @@ pub use position_codec::{PositionCoder, STEP as POSITION_STEP};
 pub use r3d_file::R3dReader;
 pub use recording::{RECORDING_EXTENSIONS, RecordingOptions, open_recording, open_recording_with};
 pub use rectified::Rectified;
+pub use reoriented::Reoriented;
 pub use rgbd_folder::{CameraFile, RgbdFolder, RgbdFolderWriter, depth_to_mm, read_camera};
 pub use rgbd_source::RgbdSource;
 pub use shared_data::shared_data;

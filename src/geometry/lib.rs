@@ -27,6 +27,7 @@
 //!
 //! - Projection: [`mod@camera::intrinsics`].
 //! - Lens distortion: [`mod@camera::lens`], inverse [`mod@camera::undistort`]; rectification: [`mod@camera::rectify`].
+//! - Turned and mirrored cameras: calibration [`mod@camera::mounting`], pictures [`mod@camera::reorient`].
 //! - Depth in the colour view: [`mod@camera::register`].
 //! - Noise of Kinect v1 and time-of-flight: [`mod@camera::noise`].
 //!

@@ -20,6 +20,8 @@ pub mod labelled;
 mod paint;
 mod physique;
 mod posture;
+#[cfg(test)]
+mod reoriented_tests;
 mod room;
 mod routine;
 mod sequence;

@@ -5,7 +5,7 @@ use crate::live::{Awaited, DriverCalls, Liveness, Open, say_lost, until_back};
 use crate::push::{Feed, Newest, is_push};
 use crate::reader::{ReadEnd, Reader};
 use crate::recorder::{Recorder, Recording};
-use crate::source::{OpenSource, liveness};
+use crate::source::{OpenSource, liveness, upright};
 use std::future::pending;
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -241,7 +241,8 @@ impl Task {
             device => format!("{}: {device}", self.config.source),
         };
         self.info.send_modify(|i| i.source = source);
-        self.read(feed.source, Some(feed.newest)).await
+        let upright = upright(&self.config, feed.source);
+        self.read(upright, Some(feed.newest)).await
     }
 
     /// Reads a source under a new epoch.

@@ -27,7 +27,7 @@ mod service;
 mod source;
 
 pub use check::check;
-pub use source::{OpenSource, SourceError, open};
+pub use source::{OpenSource, SourceError, is_live, is_recording, open, open_with};
 
 use std::sync::Arc;
 use tryon_kit::config::Config;

@@ -5,7 +5,7 @@ use crate::pattern::Pattern;
 use crate::push::is_push;
 use std::path::Path;
 use tryon_devices::{DeviceOptions, is_device};
-use tryon_formats::{CameraFile, RecordingOptions, RgbdSource, open_recording_with};
+use tryon_formats::{CameraFile, RecordingOptions, Reoriented, RgbdSource, open_recording_with};
 use tryon_kit::config::CameraConfig;
 use tryon_synth::{Actor, Posture, Routine, Sequence, Setting, SynthSource};
 
@@ -27,18 +27,29 @@ pub struct SourceError {
 /// # Errors
 /// Names the source, and the file and field at fault.
 pub fn open(name: &str) -> Result<OpenSource, SourceError> {
-    open_camera(&CameraConfig {
-        source: name.into(),
-        ..CameraConfig::default()
-    })
+    open_with(name, None)
 }
 
-/// Opens the source of a camera. A device may keep its thread waiting for seconds.
+/// Opens the source of a camera, with its pictures set upright. A device may keep its thread waiting for seconds.
 ///
 /// # Errors
 /// As [`open`].
 pub(crate) fn open_camera(config: &CameraConfig) -> Result<OpenSource, SourceError> {
-    let (name, camera) = (config.source.as_str(), config.camera_file());
+    let source = open_with(&config.source, config.camera_file())?;
+    Ok(upright(config, source))
+}
+
+/// The source with its pictures set upright as the camera is mounted.
+pub(crate) fn upright(config: &CameraConfig, source: OpenSource) -> OpenSource {
+    Reoriented::wrap(Path::new(&config.source), source, config.mounting())
+}
+
+/// As [`open`]; `camera` is a `camera.json` for devices and recordings without a calibration of their own. A device may
+/// keep its thread waiting for seconds.
+///
+/// # Errors
+/// As [`open`].
+pub fn open_with(name: &str, camera: Option<&Path>) -> Result<OpenSource, SourceError> {
     match kind(name)? {
         SourceKind::Pattern => Ok(Box::new(Pattern::new())),
         SourceKind::Synth(routine) => Ok(synth(routine)),
@@ -49,6 +60,16 @@ pub(crate) fn open_camera(config: &CameraConfig) -> Result<OpenSource, SourceErr
         SourceKind::Device => device(name, camera),
         SourceKind::Recording(path) => recording(name, path, camera),
     }
+}
+
+/// True for the path of a recording, whether it is there or not.
+pub fn is_recording(name: &str) -> bool {
+    matches!(kind(name), Ok(SourceKind::Recording(_)))
+}
+
+/// True for a source whose frames come once, at their own pace.
+pub fn is_live(name: &str) -> bool {
+    liveness(name) != Liveness::Patient
 }
 
 /// Checks the source of a camera. Of a recording it reads as much as [`open`]; a device may be unplugged.
@@ -188,6 +209,8 @@ mod tests {
             "v4l2:7",
         ];
         assert!(fine.iter().all(|s| check(s, "").is_ok()));
+        let names = ["push", "synth", "/nowhere/at/all", "synth:handstand"];
+        assert_eq!(names.map(is_recording), [false, false, true, false]);
         for bad in ["synth:handstand", "/nowhere/at/all", "freenect:"] {
             let e = open(bad).err().expect("refused").to_string();
             assert!(e.starts_with(bad), "{e}");

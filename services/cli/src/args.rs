@@ -1,5 +1,6 @@
 //! Commands and flags of the command line.
 
+mod camera;
 mod clothcap;
 mod fine;
 mod identity;
@@ -7,6 +8,9 @@ mod offline;
 mod serve;
 mod token;
 
+pub(crate) use camera::{
+    CameraArgs, CameraCheckArgs, CameraListArgs, CameraSourceArgs, CameraViewArgs, CameraWhat,
+};
 pub(crate) use clothcap::{
     ClothcapAlignArgs, ClothcapArgs, ClothcapCaptureArgs, ClothcapRetargetArgs,
     ClothcapSegmentArgs, ClothcapWhat, ScanArgs, Shard,
@@ -74,11 +78,13 @@ pub(crate) enum Command {
     Record(RecordArgs),
     /// Publish a recording as if it were a live camera.
     Replay(ReplayArgs),
+    /// Cameras: which there are, what one delivers, whether its place suits.
+    Camera(CameraArgs),
     /// Keys, tokens and enrolment codes: who may call the services.
     Token(TokenArgs),
     /// The authority by which a store's services know each other, and certificates of it.
     Identity(IdentityArgs),
-    /// Check this machine: cores, memory, graphics adapter, ports, shared data; report expected faults.
+    /// Check this machine: cores, memory, graphics adapter, ports, cameras, shared data; report expected faults.
     Doctor(DoctorArgs),
 }
 

@@ -21,8 +21,11 @@
 )]
 
 mod args;
+mod cameras;
 mod closed_output;
 mod commands;
+mod depth_picture;
+mod findings;
 mod input;
 mod interrupt;
 mod offline_files;
@@ -32,6 +35,7 @@ mod preview;
 mod recording;
 mod report;
 mod say;
+mod terminal_picture;
 mod viewer;
 
 use args::{Cli, Command};
@@ -73,6 +77,7 @@ fn main() -> ExitCode {
         Command::Export(a) => commands::export::run(&a),
         Command::Record(a) => commands::record::run(&a),
         Command::Replay(a) => commands::replay::run(&a),
+        Command::Camera(a) => commands::camera::run(&a),
         Command::Token(a) => commands::token::run(&a),
         Command::Identity(a) => commands::identity::run(&a),
         Command::Doctor(a) => commands::doctor::run(&a),

@@ -296,6 +296,20 @@ mod tests {
     }
 
     #[test]
+    fn cameras_are_mounted_by_quarter_turns() {
+        let load = |set: &str| {
+            let cameras = format!("capture.cameras=[{{{set}}}]");
+            Config::load(None, &[cameras]).map_err(|e| e.to_string())
+        };
+        let mounted = load("turned=270,mirrored=true").expect("a quarter");
+        let mounting = mounted.capture.cameras[0].mounting();
+        assert_eq!((mounting.turned.degrees(), mounting.mirrored), (270, true));
+        assert!(Config::default().capture.cameras[0].mounting().is_upright());
+        let e = load("turned=45").expect_err("no quarter");
+        assert!(e.contains("45 degrees") && e.contains("turned"), "{e}");
+    }
+
+    #[test]
     fn flags_win_and_unknown_keys_are_refused() {
         let dir = tempfile::tempdir().expect("a folder");
         let file = dir.path().join("c.toml");

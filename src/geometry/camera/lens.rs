@@ -112,6 +112,17 @@ pub struct LensCalibration {
     pub color_from_depth: Rigid<ColorCamera, Camera>,
 }
 
+impl LensCalibration {
+    /// The cameras without their distortion.
+    pub fn pinholes(&self) -> Calibration {
+        Calibration {
+            depth: self.depth.intrinsics,
+            color: self.color.map(|lens| lens.intrinsics),
+            color_from_depth: self.color_from_depth,
+        }
+    }
+}
+
 impl From<Calibration> for LensCalibration {
     fn from(c: Calibration) -> Self {
         Self {

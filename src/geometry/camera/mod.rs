@@ -3,21 +3,25 @@
 mod image;
 pub(crate) mod intrinsics;
 pub(crate) mod lens;
+pub(crate) mod mounting;
 pub(crate) mod noise;
 pub(crate) mod rectify;
 pub(crate) mod register;
+pub(crate) mod reorient;
 mod resample;
 pub(crate) mod undistort;
 
 pub use image::{ColorImage, DepthImage, FrameSizeError, ImageError};
 pub use intrinsics::{Intrinsics, IntrinsicsError};
 pub use lens::{Distortion, DistortionError, Lens, LensCalibration};
+pub use mounting::{Mounting, PictureTurn, PictureTurnError};
 pub use noise::{
     KINECT_V1_LATERAL_SIGMA, NoiseModel, NoiseSettings, kinect_v1_axial_sigma,
     time_of_flight_axial_sigma,
 };
 pub use rectify::Rectifier;
 pub use register::Registration;
+pub use reorient::Reorienter;
 
 use crate::math::{Camera, ColorCamera, Rigid};
 use serde::{Deserialize, Serialize};

@@ -24,11 +24,7 @@ impl Rectifier {
     pub fn new(lenses: &LensCalibration) -> Self {
         let color = lenses.color.unwrap_or(lenses.depth);
         Self {
-            calibration: Calibration {
-                depth: lenses.depth.intrinsics,
-                color: lenses.color.map(|lens| lens.intrinsics),
-                color_from_depth: lenses.color_from_depth,
-            },
+            calibration: lenses.pinholes(),
             depth: table(lenses.depth, DepthTable::new),
             color: table(color, ColorTable::new),
             spare: <_>::default(),

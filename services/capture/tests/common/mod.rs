@@ -20,11 +20,16 @@ pub(crate) type Client = CaptureServiceClient<tonic::transport::Channel>;
 
 /// The service after a line of shell, with a source for camera `front`; its gRPC URL. Recordings go into `folder`.
 pub(crate) fn start(folder: &Path, before: &str, source: &str) -> (Process, String) {
+    start_camera(folder, before, &format!("source=\"{source}\""))
+}
+
+/// As [`start`], with keys of the camera.
+pub(crate) fn start_camera(folder: &Path, before: &str, keys: &str) -> (Process, String) {
     let set = [
         "capture.address=127.0.0.1:0".to_owned(),
         "capture.admin=127.0.0.1:0".to_owned(),
         format!("capture.recordings={}", folder.display()),
-        format!("capture.cameras=[{{name=\"front\",source=\"{source}\",rate=30.0}}]"),
+        format!("capture.cameras=[{{name=\"front\",{keys},rate=30.0}}]"),
         format!(
             "bus.listen=[\"unixsock-stream/{}\"]",
             folder.join("bus").display()

@@ -1,67 +1,32 @@
 //! `tryon doctor`: capabilities of this machine and expected faults.
 
 use crate::args::DoctorArgs;
+use crate::{cameras, findings};
 use anyhow::Result;
-use serde::Serialize;
 use std::net::TcpListener;
 use std::path::Path;
 use std::process::ExitCode;
-
-/// Result of one check.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "lowercase")]
-enum Verdict {
-    /// As it should be.
-    Good,
-    /// Works with limits; the text has the remedy.
-    Note,
-    /// Something will fail; the text has the remedy.
-    Bad,
-}
-
-#[derive(Debug, Serialize)]
-struct Finding {
-    what: &'static str,
-    verdict: Verdict,
-    detail: String,
-}
+use tryon::inspection::{Finding, Rating};
 
 /// Runs the command. Exit code 1 when something will fail.
 ///
 /// # Errors
 /// Only when the report cannot be printed.
 pub(crate) fn run(args: &DoctorArgs) -> Result<ExitCode> {
-    let findings = [
-        cores(),
-        memory(),
-        body(),
-        adapter(),
-        port(8080),
-        shared_data(),
-    ];
+    let mut all = vec![cores(), memory(), body(), adapter(), port(8080)];
+    all.extend(cameras::findings(&tryon_devices::list()));
+    all.push(shared_data());
     if args.json {
-        println!("{}", serde_json::to_string_pretty(&findings)?);
+        findings::print_json(&all)?;
     } else {
-        for f in &findings {
-            let mark = match f.verdict {
-                Verdict::Good => "ok  ",
-                Verdict::Note => "note",
-                Verdict::Bad => "BAD ",
-            };
-            println!("{mark} {:14} {}", f.what, f.detail);
-        }
+        findings::print(&all);
     }
-    let bad = findings.iter().any(|f| f.verdict == Verdict::Bad);
-    Ok(if bad {
-        ExitCode::FAILURE
-    } else {
-        ExitCode::SUCCESS
-    })
+    Ok(findings::exit_code(&all))
 }
 
 fn cores() -> Finding {
     let n = std::thread::available_parallelism().map_or(1, usize::from);
-    let verdict = if n >= 2 { Verdict::Good } else { Verdict::Note };
+    let verdict = if n >= 2 { Rating::Good } else { Rating::Note };
     Finding {
         what: "cores",
         verdict,
@@ -85,19 +50,19 @@ fn memory() -> Finding {
     match available {
         Some(mib) if mib >= WANTED_MIB => Finding {
             what: "memory",
-            verdict: Verdict::Good,
+            verdict: Rating::Good,
             detail: format!("{mib} MiB available"),
         },
         Some(mib) => Finding {
             what: "memory",
-            verdict: Verdict::Note,
+            verdict: Rating::Note,
             detail: format!(
                 "{mib} MiB available; the chain of one box is measured against 500 MiB, leave it {WANTED_MIB}"
             ),
         },
         None => Finding {
             what: "memory",
-            verdict: Verdict::Note,
+            verdict: Rating::Note,
             detail: "this system does not tell".into(),
         },
     }
@@ -112,7 +77,7 @@ fn body() -> Finding {
     );
     Finding {
         what: "body",
-        verdict: Verdict::Good,
+        verdict: Rating::Good,
         detail,
     }
 }
@@ -121,7 +86,7 @@ fn adapter() -> Finding {
     match tryon::view::gpu::adapters() {
         list if list.is_empty() => Finding {
             what: "graphics",
-            verdict: Verdict::Note,
+            verdict: Rating::Note,
             detail: "no wgpu adapter: pictures are drawn on the CPU, which needs nothing else"
                 .into(),
         },
@@ -136,7 +101,7 @@ fn adapter() -> Finding {
             });
             Finding {
                 what: "graphics",
-                verdict: Verdict::Good,
+                verdict: Rating::Good,
                 detail: names.collect::<Vec<_>>().join("; "),
             }
         }
@@ -147,12 +112,12 @@ fn port(number: u16) -> Finding {
     match TcpListener::bind(("127.0.0.1", number)) {
         Ok(_) => Finding {
             what: "port",
-            verdict: Verdict::Good,
+            verdict: Rating::Good,
             detail: format!("{number} is free for the mirror page"),
         },
         Err(e) => Finding {
             what: "port",
-            verdict: Verdict::Note,
+            verdict: Rating::Note,
             detail: format!(
                 "{number}: {e}; start the demo with --listen 127.0.0.1:0 or another port"
             ),
@@ -170,7 +135,7 @@ fn shared_data() -> Finding {
     };
     Finding {
         what: "shared data",
-        verdict: if found { Verdict::Good } else { Verdict::Note },
+        verdict: if found { Rating::Good } else { Rating::Note },
         detail,
     }
 }

@@ -4,6 +4,7 @@ use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::net::{IpAddr, Ipv4Addr, SocketAddr};
 use std::path::{Path, PathBuf};
+use tryon_geometry::camera::{Mounting, PictureTurn};
 use tryon_geometry::settings;
 
 const fn local(port: u16) -> SocketAddr {
@@ -207,6 +208,10 @@ settings! {
         pub looped: bool = true,
         /// Start publishing with the process.
         pub autostart: bool = true,
+        /// Clockwise turn that sets its picture upright, degrees: 0, 90, 180 or 270.
+        pub turned: PictureTurn = PictureTurn::None,
+        /// It delivers mirrored pictures; they are unmirrored before they are turned.
+        pub mirrored: bool = false,
     }
 
     /// The tracking service.
@@ -296,6 +301,14 @@ settings! {
 }
 
 impl CameraConfig {
+    /// Difference of its pictures from upright ones.
+    pub fn mounting(&self) -> Mounting {
+        Mounting {
+            turned: self.turned,
+            mirrored: self.mirrored,
+        }
+    }
+
     /// The given calibration, if any.
     pub fn camera_file(&self) -> Option<&Path> {
         Some(self.camera.as_path()).filter(|p| !p.as_os_str().is_empty())

@@ -1,0 +1,62 @@
+//! Source whose frames are set upright as they are read: of a camera that hangs turned, or delivers mirrored pictures.
+
+use super::FormatError;
+use super::rgbd_source::RgbdSource;
+use std::path::{Path, PathBuf};
+use tryon_geometry::camera::{Calibration, LensCalibration, Mounting, Reorienter, RgbdFrame};
+
+/// Source of upright frames from one that is mounted otherwise.
+pub struct Reoriented {
+    path: PathBuf,
+    source: Box<dyn RgbdSource>,
+    reorienter: Reorienter,
+}
+
+impl Reoriented {
+    /// Wraps `source` unless it is upright; `path` is named in errors.
+    pub fn wrap(
+        path: &Path,
+        source: Box<dyn RgbdSource>,
+        mounting: Mounting,
+    ) -> Box<dyn RgbdSource> {
+        if mounting.is_upright() {
+            return source;
+        }
+        Box::new(Self {
+            path: path.to_owned(),
+            reorienter: Reorienter::new(mounting, &source.lenses()),
+            source,
+        })
+    }
+}
+
+impl RgbdSource for Reoriented {
+    fn calibration(&self) -> &Calibration {
+        self.reorienter.calibration()
+    }
+    fn lenses(&self) -> LensCalibration {
+        self.reorienter.lenses().clone()
+    }
+    fn untaken(&self) -> &[String] {
+        self.source.untaken()
+    }
+    fn len(&self) -> Option<usize> {
+        self.source.len()
+    }
+    fn next_frame(&mut self) -> Result<Option<RgbdFrame>, FormatError> {
+        let Some(mut frame) = self.source.next_frame()? else {
+            return Ok(None);
+        };
+        self.reorienter.reorient(&mut frame).map_err(|e| {
+            FormatError::field(
+                &self.path,
+                format!("frame {}", frame.sequence),
+                e.to_string(),
+            )
+        })?;
+        Ok(Some(frame))
+    }
+    fn rewind(&mut self) -> Result<(), FormatError> {
+        self.source.rewind()
+    }
+}
