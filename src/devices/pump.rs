@@ -4,8 +4,8 @@ use super::driver::{Driver, Formats};
 use super::newest::Newest;
 use super::pairing::Pairing;
 use super::{DeviceError, Stream};
-use std::sync::Arc;
-use std::sync::mpsc::{Receiver, Sender, channel};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
+use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::Builder;
 use std::time::{Duration, Instant};
 
@@ -17,14 +17,32 @@ const SILENCE: Duration = Duration::from_millis(500);
 const SILENT_PERIODS: f64 = 4.0;
 /// Periods after which a pair is too old to be given.
 const STALE_PERIODS: f64 = 2.0;
-/// Longest wait for the driver to close. One that hangs keeps its thread, which owns all that it touches.
-const CLOSING: Duration = Duration::from_secs(1);
+/// Longest wait for cameras to close. A driver that hangs keeps its thread, which owns all that it touches.
+const MAX_CLOSING: Duration = Duration::from_secs(1);
 
-/// A camera whose images are collected. Dropping it closes the camera.
+/// Disconnected once a camera is closed.
+type Closed = Receiver<()>;
+
+/// Cameras that are being closed.
+static CLOSING: Mutex<Vec<Closed>> = Mutex::new(Vec::new());
+
+/// A camera whose images are collected. Dropping it closes the camera, soon and without waiting.
 pub(crate) struct Pump {
     pub(crate) newest: Arc<Newest>,
-    /// Disconnected once the driver is closed.
-    closed: Receiver<()>,
+    closed: Option<Closed>,
+}
+
+/// Waits for the cameras that are being closed, so that they can be opened again; not for those whose driver hangs.
+pub(crate) fn settle() {
+    let closing = std::mem::take(&mut *CLOSING.lock().unwrap_or_else(PoisonError::into_inner));
+    let end = Instant::now() + MAX_CLOSING;
+    for closed in closing {
+        if let Err(RecvTimeoutError::Timeout) =
+            closed.recv_timeout(end.saturating_duration_since(Instant::now()))
+        {
+            tracing::warn!("a camera's driver hangs: its thread is abandoned");
+        }
+    }
 }
 
 impl Pump {
@@ -50,6 +68,7 @@ impl Pump {
         };
         let thread = Builder::new().name("camera".into()).spawn(|| task.run());
         thread.map_err(|e| DeviceError::driver(name, "thread", e.to_string()))?;
+        let closed = Some(closed);
         Ok(Self { newest, closed })
     }
 }
@@ -57,7 +76,8 @@ impl Pump {
 impl Drop for Pump {
     fn drop(&mut self) {
         self.newest.close();
-        let _ = self.closed.recv_timeout(CLOSING);
+        let mut closing = CLOSING.lock().unwrap_or_else(PoisonError::into_inner);
+        closing.extend(self.closed.take());
     }
 }
 
@@ -103,7 +123,7 @@ impl Task {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::driver::{Encoding, RawImage, StreamFormat};
+    use crate::driver::{Encoding, SensorImage, StreamFormat};
     use std::sync::atomic::{AtomicBool, Ordering};
 
     const DEPTH: Formats = Formats {
@@ -124,8 +144,8 @@ mod tests {
     }
 
     impl Driver for Fake {
-        fn poll(&mut self, sink: &mut dyn FnMut(RawImage)) -> Result<(), DeviceError> {
-            std::thread::sleep(Duration::from_millis(5));
+        fn poll(&mut self, sink: &mut dyn FnMut(SensorImage)) -> Result<(), DeviceError> {
+            std::thread::park_timeout(Duration::from_millis(5));
             if self.images == 0 {
                 return if self.fails {
                     Err(DeviceError::driver("v4l2:1", "depth", "no such device"))
@@ -134,7 +154,7 @@ mod tests {
                 };
             }
             self.images -= 1;
-            sink(RawImage {
+            sink(SensorImage {
                 stream: Stream::Depth,
                 time_ns: self.images,
                 bytes: vec![],
@@ -176,10 +196,38 @@ mod tests {
     }
 
     #[test]
-    fn dropping_the_pump_closes_the_camera_first() {
+    fn a_dropped_camera_is_closed_before_another_is_opened() {
         let (pump, is_dropped) = start(u64::MAX, false);
         pump.newest.take().expect("an image");
         drop(pump);
+        settle();
         assert!(is_dropped.load(Ordering::SeqCst));
+    }
+
+    /// Never comes back from its second poll.
+    struct Hung(bool);
+
+    impl Driver for Hung {
+        fn poll(&mut self, sink: &mut dyn FnMut(SensorImage)) -> Result<(), DeviceError> {
+            while std::mem::replace(&mut self.0, true) {
+                std::thread::park();
+            }
+            sink(SensorImage {
+                stream: Stream::Depth,
+                time_ns: 0,
+                bytes: vec![],
+            });
+            Ok(())
+        }
+    }
+
+    #[test]
+    fn a_driver_that_hangs_is_abandoned() {
+        let pump = Pump::start("v4l2:1", Box::new(Hung(false)), &DEPTH).expect("a thread");
+        pump.newest.take().expect("an image");
+        drop(pump);
+        // Both return.
+        settle();
+        settle();
     }
 }

@@ -113,6 +113,7 @@ impl Drop for OniStream {
     fn drop(&mut self) {
         // SAFETY: the stream exists, and nothing uses it any more. Stopping a stopped stream does nothing.
         unsafe { (self.functions.oniStreamStop)(self.handle) };
+        #[allow(clippy::disallowed_methods)] // on the camera's own thread
         std::thread::sleep(SETTLING);
         // SAFETY: as above, and the driver's thread has ended.
         unsafe { (self.functions.oniStreamDestroy)(self.handle) };

@@ -27,7 +27,7 @@ pub(crate) fn replay_library() -> Option<PathBuf> {
 /// Disparity of a pixel of an image: all depths in reach, some without a reading.
 pub(crate) fn disparity(image: u32, pixel: usize) -> u16 {
     let i = pixel as u32 + 977 * image;
-    if i % 11 == 0 {
+    if i.is_multiple_of(11) {
         2047
     } else {
         430 + (i % 560) as u16
