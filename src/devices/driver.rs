@@ -58,7 +58,7 @@ pub(crate) struct Formats {
 
 /// One image.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(crate) struct RawImage {
+pub(crate) struct SensorImage {
     pub(crate) stream: Stream,
     /// Capture time on the camera's clock, nanoseconds; one clock for both streams.
     pub(crate) time_ns: u64,
@@ -71,7 +71,7 @@ pub(crate) trait Driver: Send {
     ///
     /// # Errors
     /// When the camera has gone.
-    fn poll(&mut self, sink: &mut dyn FnMut(RawImage)) -> Result<(), DeviceError>;
+    fn poll(&mut self, sink: &mut dyn FnMut(SensorImage)) -> Result<(), DeviceError>;
 }
 
 /// An opened camera.

@@ -5,7 +5,7 @@
 //!
 //! # Ideas
 //!
-//! - Names of cameras: [`mod@device`], faults with their remedy [`mod@error`].
+//! - Families [`mod@family`], cameras by serial number [`mod@device`], faults with their remedy [`mod@error`].
 //! - Images to frames: drivers [`mod@driver`], a thread for each camera [`mod@pump`], pairs by time [`mod@pairing`], the
 //!   newest wins [`mod@newest`], [`mod@decode`].
 //! - Families: [`mod@freenect`], [`mod@openni`], [`mod@v4l2`]; shared libraries at run time [`mod@library`].
@@ -16,6 +16,7 @@ mod decode;
 mod device;
 mod driver;
 mod error;
+mod family;
 mod freenect;
 mod library;
 mod newest;
@@ -26,8 +27,9 @@ mod pump;
 mod source;
 mod v4l2;
 
-pub use device::{Device, DeviceOptions, Family, FamilyReport, Mode, Stream};
+pub use device::{Device, DeviceOptions, FamilyReport, Mode};
 pub use error::DeviceError;
+pub use family::{Family, Stream};
 
 use tryon_formats::RgbdSource;
 

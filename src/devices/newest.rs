@@ -1,14 +1,14 @@
 //! The newest pair of a camera, until the reader takes it.
 
 use super::DeviceError;
-use super::pairing::Pair;
+use super::pairing::ExposurePair;
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
 #[derive(Default)]
 struct State {
     /// And when it came.
-    waiting: Option<(Pair, Instant)>,
+    waiting: Option<(ExposurePair, Instant)>,
     /// The camera has gone.
     fault: Option<DeviceError>,
     is_closed: bool,
@@ -38,7 +38,7 @@ impl Newest {
     }
 
     /// Puts a pair in place of the one that waits.
-    pub(crate) fn put(&self, pair: Pair) {
+    pub(crate) fn put(&self, pair: ExposurePair) {
         let mut state = self.state();
         if !state.is_closed {
             let before = state.waiting.replace((pair, Instant::now()));
@@ -57,7 +57,7 @@ impl Newest {
     ///
     /// # Errors
     /// The camera's fault, again at each call.
-    pub(crate) fn take(&self) -> Result<Pair, DeviceError> {
+    pub(crate) fn take(&self) -> Result<ExposurePair, DeviceError> {
         let mut state = self.state();
         loop {
             match state.waiting.take() {
@@ -93,12 +93,12 @@ impl Newest {
 mod tests {
     use super::*;
     use crate::Stream;
-    use crate::driver::RawImage;
+    use crate::driver::SensorImage;
 
-    fn pair(number: u64) -> Pair {
-        Pair {
+    fn pair(number: u64) -> ExposurePair {
+        ExposurePair {
             number,
-            depth: RawImage {
+            depth: SensorImage {
                 stream: Stream::Depth,
                 time_ns: number,
                 bytes: vec![],

@@ -1,17 +1,17 @@
 //! Pairs of depth and colour: nearest in time, at most half a period apart.
 
 use super::Stream;
-use super::driver::{Formats, RawImage};
+use super::driver::{Formats, SensorImage};
 use std::collections::VecDeque;
 use std::sync::Arc;
 
 /// Depth and the colour of its time.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(crate) struct Pair {
+pub(crate) struct ExposurePair {
     /// Number of the depth image since the camera was opened.
     pub(crate) number: u64,
-    pub(crate) depth: RawImage,
-    pub(crate) color: Option<Arc<RawImage>>,
+    pub(crate) depth: SensorImage,
+    pub(crate) color: Option<Arc<SensorImage>>,
 }
 
 /// Colour images kept: depth may come as many images later than its colour.
@@ -24,9 +24,9 @@ pub(crate) struct Pairing {
     /// Largest time between depth and its colour, nanoseconds; `None` without colour.
     half_period_ns: Option<u64>,
     /// Newest last.
-    colors: VecDeque<Arc<RawImage>>,
+    colors: VecDeque<Arc<SensorImage>>,
     /// Depth without colour so far, and its number.
-    waiting: VecDeque<(u64, RawImage)>,
+    waiting: VecDeque<(u64, SensorImage)>,
     next: u64,
     /// Time of the last depth.
     last_ns: u64,
@@ -51,7 +51,7 @@ impl Pairing {
     }
 
     /// Takes an image in and passes on the pairs that it completes, in the order of depth.
-    pub(crate) fn push(&mut self, image: RawImage, sink: &mut dyn FnMut(Pair)) {
+    pub(crate) fn push(&mut self, image: SensorImage, sink: &mut dyn FnMut(ExposurePair)) {
         match image.stream {
             Stream::Depth => self.push_depth(image),
             Stream::Color => self.push_color(image),
@@ -64,7 +64,7 @@ impl Pairing {
                 break;
             }
             self.unpaired += u64::from(color.is_none() && self.half_period_ns.is_some());
-            sink(Pair {
+            sink(ExposurePair {
                 number,
                 depth,
                 color,
@@ -72,7 +72,7 @@ impl Pairing {
         }
     }
 
-    fn push_depth(&mut self, depth: RawImage) {
+    fn push_depth(&mut self, depth: SensorImage) {
         if depth.time_ns < self.last_ns {
             // The clock has jumped back: colour of before is of no depth to come.
             self.colors.clear();
@@ -82,7 +82,7 @@ impl Pairing {
         self.next += 1;
     }
 
-    fn push_color(&mut self, color: RawImage) {
+    fn push_color(&mut self, color: SensorImage) {
         if self.colors.len() == MAX_COLORS {
             self.colors.pop_front();
         }
@@ -90,9 +90,9 @@ impl Pairing {
     }
 
     /// Nearest colour within half a period. A later one would be farther.
-    fn near_color(&self, time_ns: u64) -> Option<Arc<RawImage>> {
+    fn near_color(&self, time_ns: u64) -> Option<Arc<SensorImage>> {
         let half_period_ns = self.half_period_ns?;
-        let gap = |color: &&Arc<RawImage>| color.time_ns.abs_diff(time_ns);
+        let gap = |color: &&Arc<SensorImage>| color.time_ns.abs_diff(time_ns);
         let nearest = self.colors.iter().min_by_key(gap)?;
         (gap(&nearest) <= half_period_ns).then(|| nearest.clone())
     }
@@ -129,7 +129,7 @@ mod tests {
         let mut pairing = Pairing::new(&formats(color_rate));
         let mut out = Vec::new();
         for (stream, ms) in images {
-            let image = RawImage {
+            let image = SensorImage {
                 stream: if *stream == 'd' {
                     Stream::Depth
                 } else {

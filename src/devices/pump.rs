@@ -123,7 +123,7 @@ impl Task {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::driver::{Encoding, RawImage, StreamFormat};
+    use crate::driver::{Encoding, SensorImage, StreamFormat};
     use std::sync::atomic::{AtomicBool, Ordering};
 
     const DEPTH: Formats = Formats {
@@ -144,7 +144,7 @@ mod tests {
     }
 
     impl Driver for Fake {
-        fn poll(&mut self, sink: &mut dyn FnMut(RawImage)) -> Result<(), DeviceError> {
+        fn poll(&mut self, sink: &mut dyn FnMut(SensorImage)) -> Result<(), DeviceError> {
             std::thread::park_timeout(Duration::from_millis(5));
             if self.images == 0 {
                 return if self.fails {
@@ -154,7 +154,7 @@ mod tests {
                 };
             }
             self.images -= 1;
-            sink(RawImage {
+            sink(SensorImage {
                 stream: Stream::Depth,
                 time_ns: self.images,
                 bytes: vec![],
@@ -208,11 +208,11 @@ mod tests {
     struct Hung(bool);
 
     impl Driver for Hung {
-        fn poll(&mut self, sink: &mut dyn FnMut(RawImage)) -> Result<(), DeviceError> {
+        fn poll(&mut self, sink: &mut dyn FnMut(SensorImage)) -> Result<(), DeviceError> {
             while std::mem::replace(&mut self.0, true) {
                 std::thread::park();
             }
-            sink(RawImage {
+            sink(SensorImage {
                 stream: Stream::Depth,
                 time_ns: 0,
                 bytes: vec![],

@@ -30,6 +30,9 @@ pub fn judge(
     ]
 }
 
+/// Judgement of a part of a picture that has next to no depth anywhere.
+const BLIND: &str = "not judged: most of the picture has no depth";
+
 /// Grade of a measurement whose larger values are worse, by the limits of good and of usable.
 fn grade(value: f64, [good, usable]: [f64; 2]) -> Rating {
     if value <= good {

@@ -49,8 +49,9 @@ settings! {
         pub floor_holes: [f64; 2] = [0.35, 0.7],
         /// Least excess of the holes in the lower part over those in the middle that are the floor's.
         pub floor_excess: f64 = 0.1,
-        /// Share of the whole picture without depth from which nothing else can be judged.
-        pub blind: f64 = 0.7,
+        /// Share of the whole picture without depth from which nothing else can be judged. A round image in a square picture has
+        /// a fifth.
+        pub blind: f64 = 0.6,
         /// Share of washed-out colour in holes that tells sunlight, and its ratio to that elsewhere.
         pub washed_out: [f64; 2] = [0.25, 3.0],
         /// Mean brightness of holes in the lower part that are a dark floor, of 255.

@@ -13,7 +13,7 @@ use tryon_geometry::math::order_statistics::median;
 /// Side of a tile, pixels.
 const TILE: usize = 8;
 /// Least share of a tile's pixels that have both readings.
-const LEAST_READ: f64 = 0.5;
+const LEAST_READ: f64 = 0.2;
 /// Least number of tiles.
 const LEAST_TILES: usize = 20;
 

@@ -25,14 +25,14 @@ pub fn hsv_cone([r, g, b]: [u8; 3]) -> Vector3<f64> {
 }
 
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-struct Mode {
+struct MixtureMode {
     weight: f64,
     mean: Vector3<f64>,
     precision: Matrix3<f64>,
     log_norm: f64,
 }
 
-impl Mode {
+impl MixtureMode {
     fn new(weight: f64, mean: Vector3<f64>, covariance: Matrix3<f64>, noise: f64) -> Self {
         let floor = Matrix3::identity() * (noise * noise);
         let covariance = covariance + floor;
@@ -55,7 +55,7 @@ impl Mode {
 /// Gaussian mixture of colours.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ColorMixture {
-    modes: Vec<Mode>,
+    modes: Vec<MixtureMode>,
 }
 
 impl ColorMixture {
@@ -96,7 +96,7 @@ impl ColorMixture {
     }
 }
 
-fn maximise(colors: &[Vector3<f64>], shares: &[Vec<f64>], noise: f64) -> Vec<Mode> {
+fn maximise(colors: &[Vector3<f64>], shares: &[Vec<f64>], noise: f64) -> Vec<MixtureMode> {
     let k = shares.first().map_or(0, Vec::len);
     let total: f64 = shares.iter().flatten().sum();
     let mode = |m: usize| {
@@ -107,7 +107,7 @@ fn maximise(colors: &[Vector3<f64>], shares: &[Vec<f64>], noise: f64) -> Vec<Mod
         let all = || colors.iter().zip(shares).map(|(c, s)| (c, s[m] / weight));
         let mean: Vector3<f64> = all().map(|(c, s)| c * s).sum();
         let scatter = all().map(|(c, s)| (c - mean) * (c - mean).transpose() * s);
-        Some(Mode::new(weight / total, mean, scatter.sum(), noise))
+        Some(MixtureMode::new(weight / total, mean, scatter.sum(), noise))
     };
     (0..k).filter_map(mode).collect()
 }

@@ -8,7 +8,7 @@ pub(crate) use disparity::disparity_to_mm;
 
 use super::calibration::{check_sizes, given};
 use super::device::{choose, source_name};
-use super::driver::{Driver, Encoding, Formats, Opened, POLL, RawImage, StreamFormat};
+use super::driver::{Driver, Encoding, Formats, Opened, POLL, SensorImage, StreamFormat};
 use super::{Device, DeviceError, DeviceOptions, Family, Mode, Stream};
 use disparity::{REFERENCE_MM, REFERENCE_PIXEL_MM};
 use ffi::{Camera, Context, DEPTH_11BIT, DEPTH_REGISTERED, FrameMode, MEDIUM, VIDEO_RGB};
@@ -169,14 +169,14 @@ struct FreenectDriver {
 }
 
 impl Driver for FreenectDriver {
-    fn poll(&mut self, sink: &mut dyn FnMut(RawImage)) -> Result<(), DeviceError> {
+    fn poll(&mut self, sink: &mut dyn FnMut(SensorImage)) -> Result<(), DeviceError> {
         let images = self.camera.poll(POLL).map_err(|code| {
             let why = format!("libfreenect answers {code}: has the camera been unplugged?");
             DeviceError::driver(&self.name, "freenect_process_events", why)
         })?;
         for (stream, ticks, bytes) in images {
             let time_ns = self.clock.nanoseconds(ticks);
-            sink(RawImage {
+            sink(SensorImage {
                 stream,
                 time_ns,
                 bytes,

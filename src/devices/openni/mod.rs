@@ -5,7 +5,7 @@ mod modes;
 
 use super::calibration::{check_sizes, given};
 use super::device::{choose, source_name};
-use super::driver::{Driver, Formats, Opened, POLL, RawImage, StreamFormat};
+use super::driver::{Driver, Formats, Opened, POLL, SensorImage, StreamFormat};
 use super::packed::packed_rows;
 use super::{Device, DeviceError, DeviceOptions, Family, Stream};
 use ffi::{OniDevice, OniStream, Refusal, SENSOR_COLOR, SENSOR_DEPTH};
@@ -207,7 +207,7 @@ struct OpenniDriver {
 }
 
 impl Driver for OpenniDriver {
-    fn poll(&mut self, sink: &mut dyn FnMut(RawImage)) -> Result<(), DeviceError> {
+    fn poll(&mut self, sink: &mut dyn FnMut(SensorImage)) -> Result<(), DeviceError> {
         let fault = |(call, why): Refusal| DeviceError::driver(&self.name, call, why);
         let Some((index, image)) = ffi::wait(&self.streams, POLL).map_err(fault)? else {
             return Ok(());
@@ -218,7 +218,7 @@ impl Driver for OpenniDriver {
         };
         let time_ns = image.time_us.saturating_mul(1000);
         let bytes = checked_rows(image, &format).map_err(|why| fault((stream.name(), why)))?;
-        sink(RawImage {
+        sink(SensorImage {
             stream,
             time_ns,
             bytes,

@@ -85,7 +85,7 @@ fn frames_are_those_that_the_driver_draws() {
             // Its time is 33 ms times its number.
             let number = frame.time_ns / 33_000_000;
             assert!(
-                number > last && frame.time_ns % 33_000_000 == 0,
+                number > last && frame.time_ns.is_multiple_of(33_000_000),
                 "{}",
                 frame.time_ns
             );

@@ -7,10 +7,10 @@ mod sysfs;
 
 use super::calibration::given;
 use super::device::{choose, source_name};
-use super::driver::{Driver, Formats, Opened, POLL, RawImage, StreamFormat};
+use super::driver::{Driver, Formats, Opened, POLL, SensorImage, StreamFormat};
 use super::packed::packed_rows;
 use super::{Device, DeviceError, DeviceOptions, Family, Mode, Stream};
-use node::{Node, NodeMode, Streaming};
+use node::{NodeMode, Streaming, VideoNode};
 use std::io;
 use std::path::PathBuf;
 use sysfs::UsbCamera;
@@ -42,9 +42,9 @@ impl Places {
     }
 
     /// Nodes that can be opened, with their modes.
-    fn nodes(&self, camera: &UsbCamera) -> Vec<(Node, Vec<NodeMode>)> {
+    fn nodes(&self, camera: &UsbCamera) -> Vec<(VideoNode, Vec<NodeMode>)> {
         let open = |name: &String| {
-            let node = Node::open(&self.nodes.join(name)).ok()?;
+            let node = VideoNode::open(&self.nodes.join(name)).ok()?;
             let modes = node.modes();
             Some((node, modes))
         };
@@ -142,7 +142,7 @@ fn start(
     name: &str,
     stream: Stream,
     [width, height]: [u32; 2],
-    nodes: &mut Vec<(Node, Vec<NodeMode>)>,
+    nodes: &mut Vec<(VideoNode, Vec<NodeMode>)>,
 ) -> Result<Running, DeviceError> {
     let fits =
         |m: &&NodeMode| m.stream == stream && (m.format.width, m.format.height) == (width, height);
@@ -182,7 +182,7 @@ struct V4l2Driver {
 }
 
 impl Driver for V4l2Driver {
-    fn poll(&mut self, sink: &mut dyn FnMut(RawImage)) -> Result<(), DeviceError> {
+    fn poll(&mut self, sink: &mut dyn FnMut(SensorImage)) -> Result<(), DeviceError> {
         let fault = |stream: Stream| {
             let name = &self.name;
             move |why: String| DeviceError::driver(name, stream.name(), why)
@@ -195,7 +195,7 @@ impl Driver for V4l2Driver {
                 .map_err(|e| fault(*stream)(e.to_string()))?;
             let Some(image) = image else { continue };
             let bytes = packed_rows(image.bytes, streaming.bytes_per_line as usize, format);
-            sink(RawImage {
+            sink(SensorImage {
                 stream: *stream,
                 time_ns: image.time_ns,
                 bytes: bytes.map_err(fault(*stream))?,

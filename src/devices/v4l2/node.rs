@@ -34,7 +34,7 @@ pub(super) struct NodeMode {
 }
 
 /// An open node.
-pub(super) struct Node {
+pub(super) struct VideoNode {
     file: File,
 }
 
@@ -43,7 +43,7 @@ fn entries<T>(mut entry: impl FnMut(u32) -> io::Result<T>) -> Vec<T> {
     (0..MAX_LIST).map_while(|i| entry(i).ok()).collect()
 }
 
-impl Node {
+impl VideoNode {
     /// Opens a node that delivers images.
     ///
     /// # Errors
@@ -181,7 +181,7 @@ pub(super) struct Streaming {
     buffers: Vec<Mapped>,
     /// Bytes from row to row; 0 for compressed images.
     pub(super) bytes_per_line: u32,
-    pub(super) node: Node,
+    pub(super) node: VideoNode,
 }
 
 /// An image of a node.

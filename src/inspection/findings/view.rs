@@ -1,12 +1,9 @@
 //! Findings about the picture: holes, sunlight, the floor's surface, things too near.
 
-use super::grade;
+use super::{BLIND, grade};
 use crate::finding::{Finding, Rating};
 use crate::inspector::InspectionReport;
 use crate::settings::FindingLimits;
-
-/// Judgement of a part of a picture that has next to no depth anywhere.
-const BLIND: &str = "not judged: most of the picture has no depth";
 
 fn percent(share: f64) -> String {
     format!("{:.0} %", 100.0 * share)

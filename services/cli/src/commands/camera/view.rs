@@ -97,6 +97,10 @@ impl View {
     }
 
     /// Waits for the time at which a recorded frame is due.
+    #[expect(
+        clippy::disallowed_methods,
+        reason = "a recording is shown at its pace, in this thread"
+    )]
     fn wait_for(&mut self, frame: &RgbdFrame) {
         let first = *self.first_ns.get_or_insert(frame.time_ns);
         let due = Duration::from_nanos(frame.time_ns.saturating_sub(first));
