@@ -4,7 +4,7 @@ use crate::consent::Leases;
 use crate::push::{Feed, Newest, is_push};
 use crate::reader::Reader;
 use crate::recorder::{Recorder, Recording};
-use crate::source::{OpenSource, open};
+use crate::source::{OpenSource, is_live, open_with};
 use std::path::PathBuf;
 use std::sync::Arc;
 use tokio::sync::{mpsc, oneshot, watch};
@@ -12,7 +12,7 @@ use tokio_util::sync::CancellationToken;
 use tonic::Status;
 use tryon_geometry::camera::Calibration;
 use tryon_kit::compute::Pool;
-use tryon_kit::config::CameraConfig;
+use tryon_kit::config::{CameraConfig, Ros2Config};
 use tryon_kit::frames::CameraKey;
 use tryon_kit::server::Context;
 use tryon_kit::sessions::{random_u64, unix_ns};
@@ -54,8 +54,13 @@ impl Handle {
 }
 
 /// Starts the task of a camera; it ends with `ctx.shutdown`.
-pub(crate) fn spawn(mut config: CameraConfig, key: CameraKey, ctx: Context) -> Handle {
-    if is_push(&config.source) {
+pub(crate) fn spawn(
+    mut config: CameraConfig,
+    ros2: Ros2Config,
+    key: CameraKey,
+    ctx: Context,
+) -> Handle {
+    if is_live(&config.source) {
         // Its frames come at their pace, once.
         (config.fast, config.looped) = (true, false);
     }
@@ -72,6 +77,7 @@ pub(crate) fn spawn(mut config: CameraConfig, key: CameraKey, ctx: Context) -> H
     tokio::spawn(
         Task {
             config,
+            ros2,
             key,
             ctx,
             info: Arc::new(sender),
@@ -90,6 +96,9 @@ pub(crate) fn spawn(mut config: CameraConfig, key: CameraKey, ctx: Context) -> H
 
 /// Name of a source outside the box: of a recording the file name only.
 fn shown(source: &str) -> String {
+    if is_live(source) {
+        return source.into();
+    }
     std::path::Path::new(source)
         .file_name()
         .map_or_else(|| source.into(), |n| n.to_string_lossy().into_owned())
@@ -106,6 +115,7 @@ struct Run {
 
 struct Task {
     config: CameraConfig,
+    ros2: Ros2Config,
     key: CameraKey,
     ctx: Context,
     info: Arc<watch::Sender<v1::CameraInfo>>,
@@ -140,11 +150,16 @@ impl Task {
     }
 
     async fn open(&self) -> Result<OpenSource, String> {
-        let name = self.config.source.clone();
-        match self.ctx.pool.run(move || open(&name)).await {
-            Ok(opened) => opened.map_err(|e| e.to_string()),
-            Err(e) => Err(e.to_string()),
-        }
+        let (name, ros2) = (self.config.source.clone(), self.ros2.clone());
+        // A device may take seconds, in which computations would wait.
+        let pool = match is_live(&name) {
+            true => Pool::background("open").map_err(|e| e.to_string())?,
+            false => self.ctx.pool.clone(),
+        };
+        let opened = pool.run(move || open_with(&name, &ros2)).await;
+        opened
+            .map_err(|e| e.to_string())?
+            .map_err(|e| e.to_string())
     }
 
     async fn start(&mut self) -> Result<v1::CameraInfo, Status> {

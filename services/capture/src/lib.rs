@@ -8,6 +8,7 @@
 //! - Consent: leases and their key [`mod@consent`], their renewal `services/kit/src/consent.rs`.
 //! - Consent to record: [`mod@service`].
 //! - Frames of another program: [`mod@push`].
+//! - Cameras of ROS 2 over zenoh: [`mod@ros2`].
 //! - Pace of a source: [`mod@pace`].
 #![allow(rustdoc::private_intra_doc_links)] // the index of ideas names private modules
 
@@ -19,11 +20,12 @@ mod pattern;
 mod push;
 mod reader;
 mod recorder;
+mod ros2;
 mod service;
 mod source;
 
-pub use check::check;
-pub use source::{OpenSource, SourceError, open};
+pub use check::{check, check_process};
+pub use source::{OpenSource, SourceError, open, open_with};
 
 use std::sync::Arc;
 use tryon_kit::config::Config;
@@ -69,7 +71,13 @@ pub async fn start(config: &Config, ctx: Context) -> Result<Running, StartError>
         .iter()
         .filter(|camera| camera.autostart && !push::is_push(&camera.source))
     {
-        capture.autostart(&camera.name).await;
+        let (capture, name) = (capture.clone(), camera.name.clone());
+        let started = async move { capture.autostart(&name).await };
+        match source::is_live(&camera.source) {
+            // A device may take seconds.
+            true => drop(tokio::spawn(started)),
+            false => started.await,
+        }
     }
     Ok(running)
 }

@@ -32,7 +32,8 @@ impl Capture {
         let spawn = |c: &tryon_kit::config::CameraConfig| {
             // Names were checked with the configuration.
             let key = CameraKey::new(&config.store, &c.name)?;
-            let handle = camera::spawn(c.clone(), key.clone(), ctx.clone());
+            let ros2 = config.ros2.clone();
+            let handle = camera::spawn(c.clone(), ros2, key.clone(), ctx.clone());
             Some((c.name.clone(), (key, handle)))
         };
         Self {
