@@ -3,6 +3,7 @@
 mod bodies;
 mod garments;
 mod images;
+mod live;
 mod meshes;
 mod recordings;
 mod secrets;
@@ -101,6 +102,7 @@ pub const TARGETS: &[Target] = &[
     recordings::BAG,
     recordings::SQLITE,
     recordings::FOLDER,
+    live::LIVE,
     secrets::TOKEN,
     secrets::SEALED,
     settings::CONFIG,
