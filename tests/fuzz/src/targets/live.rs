@@ -4,7 +4,9 @@ use super::{Target, text};
 use crate::bundle::Bundle;
 use mcap::MessageStream;
 use std::path::Path;
+use tryon::formats::image::{encode_png_depth, encode_png_rgb};
 use tryon::formats::live::{LiveCamera, LiveDecoder, LiveMessage, camera_info_topic};
+use tryon::geometry::camera::{ColorImage, DepthImage};
 
 /// Streams: raw, and compressed.
 const STREAMS: [[&str; 2]; 2] = [
@@ -19,12 +21,11 @@ pub(super) const LIVE: Target = Target::new(
     "src/formats/messages/live",
     |b, _| frame(b),
     || {
-        let files = [
-            &include_bytes!("../../../../src/formats/testdata/recordings/ros2_mcap/ros2_mcap.mcap")
-                [..],
-            include_bytes!("../../../../src/formats/testdata/recordings/compressed_ros2.mcap"),
-        ];
-        files.map(messages).to_vec()
+        let file =
+            include_bytes!("../../../../src/formats/testdata/recordings/ros2_mcap/ros2_mcap.mcap");
+        let raw = messages(file);
+        let compressed = compressed(raw.get("cam.depth.camera_info.bin"));
+        vec![raw, compressed.unwrap_or_default()]
     },
 )
 .words("16UC1 32FC1 mono16 rgb8 bgr8 yuv422 jpeg png compressedDepth plumb_bob rational_polynomial")
@@ -45,6 +46,38 @@ fn messages(file: &[u8]) -> Bundle {
         }
     }
     bundle
+}
+
+/// compressedDepth and PNG of the recording's depth camera, 12 × 9.
+fn compressed(camera: &[u8]) -> Option<Bundle> {
+    let path = Path::new("seed");
+    let depth = DepthImage::new(12, 9, (0..108).map(|v| 1000 + v).collect()).ok()?;
+    let mut data = vec![0; 12];
+    data.extend(encode_png_depth(&depth, path).ok()?);
+    let color = encode_png_rgb(&ColorImage::filled(12, 9, [9, 8, 7]), path).ok()?;
+    let bundle = Bundle::of(&member("/cam/camera_info"), camera)
+        .and(
+            &member(STREAMS[1][0]),
+            compressed_image("16UC1; compressedDepth png", &data),
+        )
+        .and(
+            &member(STREAMS[1][1]),
+            compressed_image("rgb8; png compressed bgr8", &color),
+        );
+    Some(bundle)
+}
+
+/// `sensor_msgs/CompressedImage` in little-endian CDR.
+fn compressed_image(format: &str, data: &[u8]) -> Vec<u8> {
+    // Representation, second and nanosecond.
+    let mut out = vec![0, 1, 0, 0, 1, 0, 0, 0, 2, 0, 0, 0];
+    for (text, end) in [(b"cam".as_slice(), 1), (format.as_bytes(), 1), (data, 0)] {
+        out.resize(out.len().next_multiple_of(4), 0);
+        out.extend((text.len() as u32 + end).to_le_bytes());
+        out.extend(text);
+        out.extend(std::iter::repeat_n(0, end as usize));
+    }
+    out
 }
 
 fn frame(b: &Bundle) -> Result<usize, String> {
