@@ -143,6 +143,9 @@ impl Survey {
             let Ok(Heard { topic, sample }) = self.heard.recv_timeout(left) else {
                 break;
             };
+            if left.is_zero() {
+                break;
+            }
             let topic = &self.topics[topic];
             let Ok(schema) = self.keys.schema(topic, sample.key_expr().as_str()) else {
                 continue;

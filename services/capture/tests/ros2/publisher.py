@@ -35,6 +35,15 @@ QUANT = (1000.0, -20.0)
 NAMESPACE = "robot1"
 
 
+SAYING = threading.Lock()
+
+
+def say(line):
+    """Prints a line whole: callbacks come on several threads."""
+    with SAYING:
+        print(line, flush=True)
+
+
 def depth_mm(k):
     v = np.arange(WIDTH * HEIGHT, dtype=np.uint32).reshape(HEIGHT, WIDTH)
     image = (500 + v * 37 + k * 11).astype(np.uint16)
@@ -157,6 +166,7 @@ CAMERAS = {
     "inverse": (False, inverse_depth, png, 0.0),
     "apart": (False, uint16, rgb8, 5.0),
     "alone": (True, float32, None, 0.0),
+    "broken": (True, uint16, rgb8, 0.005),
 }
 
 
@@ -216,15 +226,18 @@ class Topic:
             self.listener = self.publisher.declare_matching_listener(self.matches)
 
     def matches(self, status):
-        print(self.name, "on" if status.matching else "off", flush=True)
+        say(f"{self.name} {'on' if status.matching else 'off'}")
 
-    def put(self, message):
+    def put(self, message, broken=False):
         if not self.is_read():
             return
         kind, fields = message
         self.sequence += 1
+        data = bytes(STORE.serialize_cdr(fields, kind))
+        if broken and self.sequence % 2:
+            data = data[: 1 + 7 * self.sequence % len(data)]
         attachment = struct.pack("<qqB", self.sequence, time.time_ns(), 16) + bytes(16)
-        self.publisher.put(bytes(STORE.serialize_cdr(fields, kind)), attachment=attachment)
+        self.publisher.put(data, attachment=attachment)
 
 
 class Camera:
@@ -253,7 +266,7 @@ class Camera:
     def publish(self, k, stamp):
         frame = f"{self.name}_depth_optical"
         self.topics["depth", INFO].put(camera_info(stamp, frame, WIDTH, HEIGHT, DEPTH_K))
-        self.topics["depth"].put(self.depth(stamp, frame, k)[0])
+        self.topics["depth"].put(self.depth(stamp, frame, k)[0], broken=self.name == "broken")
         if self.color:
             stamp, frame = stamp + self.late, f"{self.name}_color_optical"
             self.topics["color", INFO].put(camera_info(stamp, frame, COLOR_WIDTH, COLOR_HEIGHT, COLOR_K))
@@ -275,7 +288,7 @@ def main():
     Path(expected).write_text(json.dumps({c.name: c.expected() for c in cameras}))
     ended = threading.Event()
     threading.Thread(target=lambda: (sys.stdin.read(), ended.set()), daemon=True).start()
-    print("ready", flush=True)
+    say("ready")
     k = 0
     while not ended.wait(PERIOD):
         stamp = time.time_ns()
