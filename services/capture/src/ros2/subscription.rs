@@ -19,7 +19,7 @@ pub(super) struct Subscription {
     begun: Mutex<Option<Begun>>,
 }
 
-/// What is undeclared at the end.
+/// Declarations that end together.
 struct Begun {
     _presence: Presence,
     _subscribers: Vec<Subscriber<()>>,

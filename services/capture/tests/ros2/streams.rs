@@ -135,7 +135,7 @@ fn a_network_that_comes_back_is_found_again() {
     let mut source = cameras.open("raw");
     cameras.picture("raw", &next(&mut source));
     let cameras = cameras.restart(folder.path());
-    // What arrived before is older than a second reading allows, or shows the same pictures.
+    // One depth image at most has waited from before.
     let begun = Instant::now();
     for _ in 0..6 {
         let frame = next(&mut source);
