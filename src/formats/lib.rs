@@ -9,8 +9,8 @@
 //! Camera and files:
 //!
 //! - Recordings: [`mod@recording`], [`mod@rgbd_folder`], [`mod@k4a_file`], [`mod@r3d_file`], [`mod@npz_recording`];
-//!   messages ([`mod@messages`]) in [`mod@mcap_file`], [`mod@bag_file`] and [`mod@rosbag2`]; rectified: [`mod@rectified`];
-//!   set upright: [`mod@reoriented`].
+//!   messages ([`mod@messages`]) live ([`mod@live`]), in [`mod@mcap_file`], [`mod@bag_file`] and [`mod@rosbag2`]; rectified:
+//!   [`mod@rectified`]; set upright: [`mod@reoriented`].
 //! - Lossless depth compression: [`mod@image::depth_codec`].
 //! - Motion clips: [`mod@bvh`], [`mod@asf_amc`].
 //! - GlTF, OBJ, MakeHuman: [`mod@gltf`], [`mod@obj`], [`mod@mhclo`].
@@ -66,6 +66,7 @@ mod zip_entries;
 pub use error::FormatError;
 pub use k4a_file::K4aReader;
 pub use mcap_file::McapWriter;
+pub use messages::live;
 pub use motion::read_motion;
 pub use motion_clip::MotionClip;
 pub use npy_frames::NpyFrames;

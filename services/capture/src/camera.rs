@@ -1,7 +1,7 @@
 //! Task of one camera: commands, state, epochs.
 
 use crate::consent::Leases;
-use crate::live::{Awaited, DriverCalls, Liveness, Open, say_lost, until_back};
+use crate::live::{Awaited, DriverCalls, Liveness, Opening, say_lost, until_back};
 use crate::push::{Feed, Newest, is_push};
 use crate::reader::{ReadEnd, Reader};
 use crate::recorder::{Recorder, Recording};
@@ -56,13 +56,15 @@ impl Handle {
     }
 }
 
-/// Starts the task of a camera, whose sources `open` opens; it ends with `ctx.shutdown`.
-pub(crate) fn spawn(mut config: CameraConfig, key: CameraKey, ctx: Context, open: Open) -> Handle {
+/// Starts the task of a camera; it ends with `ctx.shutdown`.
+pub(crate) fn spawn(mut opening: Opening, key: CameraKey, ctx: Context) -> Handle {
+    let config = &mut opening.camera;
     let liveness = liveness(&config.source);
     if liveness != Liveness::Patient {
         // Its frames come at their pace, once.
         (config.fast, config.looped) = (true, false);
     }
+    let config = opening.camera.clone();
     let info = v1::CameraInfo {
         store: key.store().into(),
         camera: key.camera().into(),
@@ -82,7 +84,7 @@ pub(crate) fn spawn(mut config: CameraConfig, key: CameraKey, ctx: Context, open
             recorder,
             leases: leases.clone(),
             liveness,
-            open,
+            opening,
             calls: DriverCalls::default(),
             run: None,
             awaited: Awaited::default(),
@@ -125,7 +127,7 @@ struct Task {
     recorder: Recorder,
     leases: Leases,
     liveness: Liveness,
-    open: Open,
+    opening: Opening,
     calls: DriverCalls,
     run: Option<Run>,
     awaited: Awaited,
@@ -176,8 +178,8 @@ impl Task {
     }
 
     async fn open(&self) -> Result<OpenSource, String> {
-        let (config, open) = (self.config.clone(), self.open);
-        let opened = self.ctx.pool.run(move || open(&config)).await;
+        let opening = self.opening.clone();
+        let opened = self.ctx.pool.run(move || opening.open()).await;
         opened
             .map_err(|e| e.to_string())?
             .map_err(|e| e.to_string())
@@ -212,10 +214,8 @@ impl Task {
 
     /// Opens a device whenever it is there, with commands served meanwhile.
     fn await_device(&mut self) {
-        let config = self.config.clone();
-        let (calls, info) = (self.calls.clone(), self.info.clone());
-        self.awaited
-            .begin(until_back(self.open, config, calls, info));
+        let (opening, calls, info) = (self.opening.clone(), self.calls.clone(), self.info.clone());
+        self.awaited.begin(until_back(opening, calls, info));
     }
 
     /// Reads a device that is back. A recording ends: its clock and calibration were those of before.

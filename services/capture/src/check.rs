@@ -4,7 +4,7 @@ use crate::source;
 use std::fs::{File, remove_file};
 use std::io;
 use std::path::Path;
-use tryon_kit::config::Config;
+use tryon_kit::config::{CameraConfig, Config, ROS2};
 use tryon_kit::server::StartError;
 
 /// Opens every recording that is a source, and writes into the folder of recordings.
@@ -28,6 +28,26 @@ pub fn check(config: &Config) -> Result<(), StartError> {
         source::check(camera).map_err(|e| fault(key, e.to_string()))?;
     }
     Ok(())
+}
+
+/// As [`check`], for a process that listens on the bus: cameras of ROS 2 are not looked for there.
+///
+/// # Errors
+/// As [`check`], and an endpoint that both networks have.
+pub fn check_process(config: &Config) -> Result<(), StartError> {
+    let is_ros2 = |c: &CameraConfig| c.source.starts_with(ROS2);
+    let ros2 = &config.capture.ros2.connect;
+    let shared = ros2.iter().find(|e| config.bus.listen.contains(e));
+    if let Some(endpoint) = shared.filter(|_| config.capture.cameras.iter().any(is_ros2)) {
+        let why = format!(
+            "{endpoint} is where this process itself listens (bus.listen): give the bus another port than ROS's router"
+        );
+        return Err(StartError::Config {
+            key: "capture.ros2.connect".into(),
+            why,
+        });
+    }
+    check(config)
 }
 
 /// Makes a file in a folder and removes it: permissions alone do not show a read-only disk.
@@ -59,6 +79,13 @@ mod tests {
             let named = format!("capture.recordings: {}", bad.display());
             assert!(fault.starts_with(&named), "{fault}");
         }
+        let ros2 = "capture.cameras=[{source=\"ros2:/depth\"}]";
+        let load = |more: &str| Config::load(None, &[ros2.into(), more.into()]).expect("loads");
+        let shared = load("capture.store=store");
+        super::check(&shared).expect("without a bus");
+        let fault = check_process(&shared).expect_err("one port").to_string();
+        assert!(fault.starts_with("capture.ros2.connect: tcp/"), "{fault}");
+        check_process(&load("bus.listen=[\"tcp/127.0.0.1:7448\"]")).expect("two ports");
         let missing = dir.path().join("missing.mcap");
         let cameras = format!("[{{source=\"{}\"}}]", missing.display());
         let fault = check("capture.cameras", Path::new(&cameras)).expect_err("missing");

@@ -8,6 +8,7 @@
 //! - Consent: leases and their key [`mod@consent`], their renewal `services/kit/src/consent.rs`.
 //! - Consent to record: [`mod@service`].
 //! - Frames of another program: [`mod@push`].
+//! - Cameras of ROS 2 over zenoh: [`mod@ros2`].
 //! - Pace of a source: [`mod@pace`].
 //! - Silence of a camera, and its return: [`mod@live`].
 #![allow(rustdoc::private_intra_doc_links)] // the index of ideas names private modules
@@ -23,10 +24,11 @@ mod pattern;
 mod push;
 mod reader;
 mod recorder;
+mod ros2;
 mod service;
 mod source;
 
-pub use check::check;
+pub use check::{check, check_process};
 pub use source::{OpenSource, SourceError, is_live, is_recording, open, open_with};
 
 use std::sync::Arc;

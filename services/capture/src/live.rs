@@ -10,7 +10,7 @@ use tokio::sync::watch;
 use tokio::task::JoinHandle;
 use tokio::time::{Instant, sleep, timeout, timeout_at};
 use tryon_kit::compute::Pool;
-use tryon_kit::config::CameraConfig;
+use tryon_kit::config::{CameraConfig, Ros2Config};
 use tryon_proto::v1::{self, CameraState};
 
 /// Shortest silence of a camera that is said.
@@ -28,8 +28,20 @@ const LONGEST_OPENING: Duration = Duration::from_secs(10);
 /// Most calls of a driver that hang before it isn't called any more.
 const MAX_HUNG: usize = 3;
 
-/// Opens the source of a camera.
-pub(crate) type Open = fn(&CameraConfig) -> Result<OpenSource, SourceError>;
+/// Way to open the source of a camera.
+#[derive(Clone)]
+pub(crate) struct Opening {
+    pub(crate) open: fn(&CameraConfig, &Ros2Config) -> Result<OpenSource, SourceError>,
+    pub(crate) camera: CameraConfig,
+    pub(crate) ros2: Ros2Config,
+}
+
+impl Opening {
+    /// Opens the source; waits as long as its driver.
+    pub(crate) fn open(&self) -> Result<OpenSource, SourceError> {
+        (self.open)(&self.camera, &self.ros2)
+    }
+}
 
 /// Expectation of a source's next frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -139,11 +151,7 @@ impl Drop for DriverCall {
 }
 
 /// Opens a device on a thread of its own; one that hangs is left to its driver.
-async fn try_open(
-    open: Open,
-    config: &CameraConfig,
-    calls: &DriverCalls,
-) -> Result<OpenSource, String> {
+async fn try_open(opening: &Opening, calls: &DriverCalls) -> Result<OpenSource, String> {
     // Nobody reads a device that is being opened.
     let hung = calls.count();
     if hung >= MAX_HUNG {
@@ -152,9 +160,9 @@ async fn try_open(
         ));
     }
     let thread = Pool::background("opening").map_err(|e| e.to_string())?;
-    let (config, call) = (config.clone(), calls.begin());
+    let (opening, call) = (opening.clone(), calls.begin());
     let opening = thread.run(move || {
-        let opened = open(&config);
+        let opened = opening.open();
         drop(call);
         opened.map_err(|e| e.to_string())
     });
@@ -202,13 +210,12 @@ impl Awaited {
 
 /// Tries to open a device until it is back. The last failure is the camera's detail.
 pub(crate) async fn until_back(
-    open: Open,
-    config: CameraConfig,
+    opening: Opening,
     calls: DriverCalls,
     info: Arc<watch::Sender<v1::CameraInfo>>,
 ) -> OpenSource {
     loop {
-        match try_open(open, &config, &calls).await {
+        match try_open(&opening, &calls).await {
             Ok(source) => return source,
             Err(why) => say_lost(&info, &why),
         }

@@ -1,6 +1,7 @@
 //! A device that vanishes, hangs and returns, under the task of its camera.
 
 use crate::camera::{self, Command, Handle};
+use crate::live::Opening;
 use crate::pattern::Pattern;
 use crate::source::{OpenSource, SourceError};
 use std::path::Path;
@@ -12,7 +13,7 @@ use tryon_formats::{FormatError, RgbdSource};
 use tryon_geometry::camera::{Calibration, RgbdFrame};
 use tryon_kit::auth::Auth;
 use tryon_kit::compute::Pool;
-use tryon_kit::config::{CameraConfig, Config};
+use tryon_kit::config::{CameraConfig, Config, Ros2Config};
 use tryon_kit::flow::Stalls;
 use tryon_kit::frames::{CameraKey, LocalBus};
 use tryon_kit::server::Context;
@@ -30,7 +31,7 @@ const PERIOD: Duration = Duration::from_millis(33);
 /// Stand-in of a driver: frames at their pace while the device is present.
 struct Device(Pattern);
 
-fn open(config: &CameraConfig) -> Result<OpenSource, SourceError> {
+fn open(config: &CameraConfig, _: &Ros2Config) -> Result<OpenSource, SourceError> {
     if DEVICE.load(Ordering::SeqCst) != PRESENT {
         return Err(SourceError {
             source_name: config.source.clone(),
@@ -98,7 +99,12 @@ async fn a_device_that_vanishes_or_hangs_is_said_and_comes_back() {
     let key = CameraKey::new("store", "front").expect("a key");
     let ctx = context();
     let shutdown = ctx.shutdown.clone();
-    let handle = camera::spawn(config, key, ctx, open);
+    let opening = Opening {
+        open,
+        camera: config,
+        ros2: Ros2Config::default(),
+    };
+    let handle = camera::spawn(opening, key, ctx);
     let (answer, started) = oneshot::channel();
     (handle.commands.send(Command::Start(answer)).await).expect("sent");
     started.await.expect("an answer").expect("started");

@@ -11,7 +11,7 @@ fn main() -> ExitCode {
     let program = Program {
         name: "capture",
         role: BusRole::Listen,
-        check: tryon_capture_service::check,
+        check: tryon_capture_service::check_process,
     };
     process::run(program, Args::parse(), |config, ctx| async move {
         tryon_capture_service::start(&config, ctx).await

@@ -1,6 +1,7 @@
 //! The rpcs: find the camera, send it a command, answer.
 
 use crate::camera::{self, Command, Handle};
+use crate::live::Opening;
 use crate::push;
 use crate::source::open_camera;
 use std::collections::BTreeMap;
@@ -33,7 +34,12 @@ impl Capture {
         let spawn = |c: &tryon_kit::config::CameraConfig| {
             // Names were checked with the configuration.
             let key = CameraKey::new(&config.store, &c.name)?;
-            let handle = camera::spawn(c.clone(), key.clone(), ctx.clone(), open_camera);
+            let opening = Opening {
+                open: open_camera,
+                camera: c.clone(),
+                ros2: config.ros2.clone(),
+            };
+            let handle = camera::spawn(opening, key.clone(), ctx.clone());
             Some((c.name.clone(), (key, handle)))
         };
         Self {

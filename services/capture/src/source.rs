@@ -1,12 +1,13 @@
-//! Sources of a camera: `synth`, `pattern`, `push`, a device as `freenect:SERIAL`, or a recording.
+//! Sources of a camera: `synth`, `pattern`, `push`, `ros2:…`, a device as `freenect:SERIAL`, or a recording.
 
 use crate::live::Liveness;
 use crate::pattern::Pattern;
 use crate::push::is_push;
+use crate::ros2;
 use std::path::Path;
 use tryon_devices::{DeviceOptions, is_device};
 use tryon_formats::{CameraFile, RecordingOptions, Reoriented, RgbdSource, open_recording_with};
-use tryon_kit::config::CameraConfig;
+use tryon_kit::config::{CameraConfig, ROS2, Ros2Config};
 use tryon_synth::{Actor, Posture, Routine, Sequence, Setting, SynthSource};
 
 /// A source ready to be read.
@@ -22,20 +23,23 @@ pub struct SourceError {
     pub why: String,
 }
 
-/// Opens a source by its configured name. Reads files: call it on the compute pool.
+/// Opens a source by its configured name, with the defaults of the configuration. Reads files: call it on the compute pool.
 ///
 /// # Errors
 /// Names the source, and the file and field at fault.
 pub fn open(name: &str) -> Result<OpenSource, SourceError> {
-    open_with(name, None)
+    open_with(name, None, &Ros2Config::default())
 }
 
 /// Opens the source of a camera, with its pictures set upright. A device may keep its thread waiting for seconds.
 ///
 /// # Errors
 /// As [`open`].
-pub(crate) fn open_camera(config: &CameraConfig) -> Result<OpenSource, SourceError> {
-    let source = open_with(&config.source, config.camera_file())?;
+pub(crate) fn open_camera(
+    config: &CameraConfig,
+    ros2: &Ros2Config,
+) -> Result<OpenSource, SourceError> {
+    let source = open_with(&config.source, config.camera_file(), ros2)?;
     Ok(upright(config, source))
 }
 
@@ -44,12 +48,16 @@ pub(crate) fn upright(config: &CameraConfig, source: OpenSource) -> OpenSource {
     Reoriented::wrap(Path::new(&config.source), source, config.mounting())
 }
 
-/// As [`open`]; `camera` is a `camera.json` for devices and recordings without a calibration of their own. A device may
-/// keep its thread waiting for seconds.
+/// As [`open`]; `camera` is a `camera.json` for devices and recordings without a calibration of their own, `ros2` the network
+/// of ROS 2 cameras. A device may keep its thread waiting for seconds.
 ///
 /// # Errors
 /// As [`open`].
-pub fn open_with(name: &str, camera: Option<&Path>) -> Result<OpenSource, SourceError> {
+pub fn open_with(
+    name: &str,
+    camera: Option<&Path>,
+    ros2: &Ros2Config,
+) -> Result<OpenSource, SourceError> {
     match kind(name)? {
         SourceKind::Pattern => Ok(Box::new(Pattern::new())),
         SourceKind::Synth(routine) => Ok(synth(routine)),
@@ -57,6 +65,7 @@ pub fn open_with(name: &str, camera: Option<&Path>) -> Result<OpenSource, Source
             name,
             "runs while a program feeds it (PublishFrames)".into(),
         )),
+        SourceKind::Ros2(topics) => ros2::open(name, &topics, ros2).map_err(|why| fault(name, why)),
         SourceKind::Device => device(name, camera),
         SourceKind::Recording(path) => recording(name, path, camera),
     }
@@ -81,7 +90,9 @@ pub(crate) fn check(config: &CameraConfig) -> Result<(), SourceError> {
     match kind(name)? {
         SourceKind::Recording(path) => recording(name, path, camera).map(drop),
         SourceKind::Device => check_device(name, camera),
-        SourceKind::Pattern | SourceKind::Push | SourceKind::Synth(_) => Ok(()),
+        SourceKind::Pattern | SourceKind::Push | SourceKind::Ros2(_) | SourceKind::Synth(_) => {
+            Ok(())
+        }
     }
 }
 
@@ -89,7 +100,7 @@ pub(crate) fn check(config: &CameraConfig) -> Result<(), SourceError> {
 pub(crate) fn liveness(name: &str) -> Liveness {
     match kind(name) {
         Ok(SourceKind::Push) => Liveness::Said,
-        Ok(SourceKind::Device) => Liveness::Reopened,
+        Ok(SourceKind::Device | SourceKind::Ros2(_)) => Liveness::Reopened,
         _ => Liveness::Patient,
     }
 }
@@ -109,6 +120,7 @@ enum SourceKind<'a> {
     Push,
     Synth(Routine),
     Device,
+    Ros2(ros2::Topics),
     Recording(&'a Path),
 }
 
@@ -120,6 +132,10 @@ fn fault(name: &str, why: String) -> SourceError {
 }
 
 fn kind(name: &str) -> Result<SourceKind<'_>, SourceError> {
+    if let Some(topics) = name.strip_prefix(ROS2) {
+        let topics = ros2::Topics::parse(topics).map_err(|why| fault(name, why))?;
+        return Ok(SourceKind::Ros2(topics));
+    }
     match name.split_once(':').unwrap_or((name, "")) {
         ("pattern", _) => Ok(SourceKind::Pattern),
         _ if is_push(name) => Ok(SourceKind::Push),
@@ -207,11 +223,17 @@ mod tests {
             "freenect:A1",
             "openni",
             "v4l2:7",
+            "ros2:/d,/c",
         ];
         assert!(fine.iter().all(|s| check(s, "").is_ok()));
         let names = ["push", "synth", "/nowhere/at/all", "synth:handstand"];
         assert_eq!(names.map(is_recording), [false, false, true, false]);
-        for bad in ["synth:handstand", "/nowhere/at/all", "freenect:"] {
+        for bad in [
+            "synth:handstand",
+            "ros2:/d,",
+            "/nowhere/at/all",
+            "freenect:",
+        ] {
             let e = open(bad).err().expect("refused").to_string();
             assert!(e.starts_with(bad), "{e}");
             assert_eq!(check(bad, "").expect_err("refused").to_string(), e);
@@ -220,8 +242,11 @@ mod tests {
             .expect_err("no file")
             .to_string();
         assert!(e.starts_with("v4l2:7: /nowhere.json"), "{e}");
-        let names = ["push", "v4l2", "synth", "v4l2.mcap"];
+        let names = ["push", "v4l2", "ros2:/d", "synth", "v4l2.mcap"];
         use Liveness::{Patient, Reopened, Said};
-        assert_eq!(names.map(liveness), [Said, Reopened, Patient, Patient]);
+        assert_eq!(
+            names.map(liveness),
+            [Said, Reopened, Reopened, Patient, Patient]
+        );
     }
 }

@@ -51,7 +51,7 @@ fn turned(image: &DepthImage) -> DepthImage {
 #[tokio::test(flavor = "multi_thread", worker_threads = 1)]
 async fn turned_cameras_publish_upright_pictures() {
     let folder = tempfile::tempdir().expect("a folder");
-    let (_process, url) = start_camera(folder.path(), "", "source=\"synth:still\",turned=90");
+    let (_process, url) = start_camera(folder.path(), "source=\"synth:still\",turned=90");
     let mut client = Client::connect(url).await.expect("connected");
     let k = depth_camera(&mut client).await;
     assert_eq!((k.width, k.height), (480, 640));

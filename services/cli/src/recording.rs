@@ -5,6 +5,7 @@ use clap::Args;
 use std::path::{Path, PathBuf};
 use tryon::formats::{FormatError, RecordingOptions, Reoriented, RgbdSource, open_recording_with};
 use tryon::geometry::camera::{Calibration, LensCalibration, Mounting, PictureTurn, RgbdFrame};
+use tryon_kit::config::Ros2Config;
 
 /// Choices that a recording may leave to the reader.
 #[derive(Debug, Default, Args)]
@@ -62,7 +63,8 @@ impl RecordingArgs {
                 self.open(path).with_context(neither)
             };
         }
-        let source = tryon_capture_service::open_with(name, self.camera.as_deref())?;
+        let source =
+            tryon_capture_service::open_with(name, self.camera.as_deref(), &Ros2Config::default())?;
         Ok(self.prepared(path, source))
     }
 

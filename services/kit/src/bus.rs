@@ -1,4 +1,5 @@
-//! Frame bus between processes over zenoh, the only module that names it: explicit endpoints, no scouting.
+//! Frame bus between processes over zenoh, the only module that names it beside `services/capture/src/ros2`, whose cameras
+//! have a network of their own: explicit endpoints, no scouting.
 //!
 //! The capture process is a peer that listens. Everybody else is a client, one session for each endpoint: a router hands
 //! frames on to clients, but between peers only with the gossip that is off here, and a capture process takes both.
@@ -9,7 +10,7 @@
 
 mod settings;
 
-pub use settings::{Ends, check};
+pub use settings::{Ends, check, client_elsewhere};
 
 use crate::compute::Pool;
 use crate::frames::exposure_to_wire;

@@ -55,6 +55,9 @@ const NOT_KEYS: [&str; 7] = [
     "TOKEN",
 ];
 
+/// Beginning of the sources that are cameras of ROS 2.
+pub const ROS2: &str = "ros2:";
+
 /// Fault of a name.
 const NAME: &str = "1 to 64 characters of [a-z0-9_-] are needed";
 
@@ -165,7 +168,11 @@ impl Config {
                 );
             }
         }
-        Ok(())
+        let has_ros2 = (self.capture.cameras.iter()).any(|c| c.source.starts_with(ROS2));
+        match self.capture.ros2.fault() {
+            Some((key, why)) if has_ros2 => fault(key, why),
+            _ => Ok(()),
+        }
     }
 
     fn validate_connections(&self) -> Result<(), ConfigError> {
@@ -276,6 +283,27 @@ mod tests {
             "tcp/localhost:7447",
         ];
         assert!(local.into_iter().all(is_local_endpoint));
+    }
+
+    #[test]
+    fn the_network_of_ros_is_checked_where_a_camera_is_on_it() {
+        let camera = "capture.cameras=[{source=\"ros2:/depth\"}]";
+        let load = |set: &[&str]| {
+            let flags = set.iter().map(|s| (*s).into());
+            Config::load(None, &flags.collect::<Vec<String>>()).map_err(|e| e.to_string())
+        };
+        assert!(load(&[camera]).is_ok());
+        for (key, value) in [
+            ("connect", "[]"),
+            ("connect", "[\"127.0.0.1:7447\"]"),
+            ("domain", "233"),
+            ("namespace", "\"a/**\""),
+        ] {
+            let set = format!("capture.ros2.{key}={value}");
+            let fault = load(&[camera, &set]).expect_err(value);
+            assert!(fault.starts_with(&format!("capture.ros2.{key}")), "{fault}");
+            assert!(load(&[&set]).is_ok(), "no camera is on it");
+        }
     }
 
     #[test]

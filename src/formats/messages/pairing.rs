@@ -1,7 +1,7 @@
 //! Pairs of two streams by nearest time.
 //!
-//! Each stream has a reader of its own, so their order in the file does not matter, and memory holds one item of the
-//! first stream and two of the second.
+//! Each stream of a file has a reader of its own, so their order in the file does not matter, and memory holds one item of
+//! the first stream and two of the second. A live stream ends its items for now where it would have to wait too long.
 
 use crate::rgbd_source::MAX_COLOR_GAP_NS;
 
@@ -12,7 +12,6 @@ pub(super) struct NearestItem<T> {
     before: Option<(u64, T)>,
     /// First item after it.
     after: Option<(u64, T)>,
-    is_ended: bool,
 }
 
 impl<T> NearestItem<T> {
@@ -20,12 +19,12 @@ impl<T> NearestItem<T> {
         Self {
             before: None,
             after: None,
-            is_ended: false,
         }
     }
 
     /// The item that pairs with time `at`: the nearest one within [`MAX_COLOR_GAP_NS`], unless a neighbour of `at` in its own
-    /// stream is nearer to it. `next` yields items in order.
+    /// stream is nearer to it. `next` yields items in order, `None` where there is none now; it is told how far the nearest
+    /// item so far is from `at`, nanoseconds.
     ///
     /// # Errors
     /// Those of `next`.
@@ -33,22 +32,19 @@ impl<T> NearestItem<T> {
         &mut self,
         at: u64,
         neighbours: [Option<u64>; 2],
-        mut next: impl FnMut() -> Result<Option<(u64, T)>, E>,
+        mut next: impl FnMut(Option<u64>) -> Result<Option<(u64, T)>, E>,
     ) -> Result<Option<&T>, E> {
-        while !self.is_ended && self.after.as_ref().is_none_or(|(t, _)| *t <= at) {
+        while self.after.as_ref().is_none_or(|(t, _)| *t <= at) {
             if let Some(passed) = self.after.take() {
                 self.before = Some(passed);
             }
-            match next()? {
+            let gap = self.before.as_ref().map(|(t, _)| t.abs_diff(at));
+            match next(gap)? {
                 Some(item) => self.after = Some(item),
-                None => self.is_ended = true,
+                None => break,
             }
         }
-        if self.is_ended && self.after.as_ref().is_some_and(|(t, _)| *t <= at) {
-            self.before = self.after.take();
-        }
-        let around = [&self.before, &self.after].into_iter().flatten();
-        let nearest = around.min_by_key(|(t, _)| t.abs_diff(at));
+        let nearest = self.nearest(at);
         Ok(nearest.and_then(|(t, item)| {
             let gap = t.abs_diff(at);
             let is_taken = neighbours
@@ -57,6 +53,25 @@ impl<T> NearestItem<T> {
                 .any(|n| n.abs_diff(*t) < gap);
             (gap <= MAX_COLOR_GAP_NS && !is_taken).then_some(item)
         }))
+    }
+
+    fn nearest(&self, at: u64) -> Option<&(u64, T)> {
+        let around = [&self.before, &self.after].into_iter().flatten();
+        around.min_by_key(|(t, _)| t.abs_diff(at))
+    }
+
+    /// Time of the nearest item less `at`, nanoseconds; `None` without one.
+    pub(super) fn offset(&self, at: u64) -> Option<i64> {
+        let (t, _) = self.nearest(at)?;
+        let gap = i64::try_from(t.abs_diff(at)).unwrap_or(i64::MAX);
+        Some(if *t < at { -gap } else { gap })
+    }
+
+    /// Forgets items further than `gap` nanoseconds from `at`: those of a clock that has jumped.
+    pub(super) fn forget_beyond(&mut self, at: u64, gap: u64) {
+        for slot in [&mut self.before, &mut self.after] {
+            slot.take_if(|(t, _)| t.abs_diff(at) > gap);
+        }
     }
 }
 
@@ -75,7 +90,7 @@ mod tests {
         for (i, &at) in depth.iter().enumerate() {
             let neighbour = |k: Option<usize>| k.and_then(|k| depth.get(k).copied());
             let neighbours = [neighbour(i.checked_sub(1)), neighbour(Some(i + 1))];
-            let next = || Ok::<_, ()>(colors.next().map(|t| (t, t)));
+            let next = |_| Ok::<_, ()>(colors.next().map(|t| (t, t)));
             out.push(
                 nearest
                     .pair(at, neighbours, next)

@@ -20,13 +20,13 @@ const FILES: [&str; 8] = [
     "compressed_ros2.mcap",
 ];
 
-fn recording(name: &str) -> PathBuf {
+pub(super) fn recording(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR"))
         .join("testdata/recordings")
         .join(name)
 }
 
-fn expected() -> Value {
+pub(super) fn expected() -> Value {
     let text = fs::read(recording("expected.json")).expect("a committed file");
     serde_json::from_slice(&text).expect("JSON")
 }
@@ -36,7 +36,7 @@ fn numbers(value: &Value) -> Vec<f64> {
     all.map(|v| v.as_f64().expect("a number")).collect()
 }
 
-fn check_frame(frame: &RgbdFrame, want: &Value, name: &str) {
+pub(super) fn check_frame(frame: &RgbdFrame, want: &Value, name: &str) {
     assert_eq!(Some(frame.time_ns), want["time_ns"].as_u64(), "{name}");
     let depth: Vec<f64> = frame.depth.data().iter().map(|d| f64::from(*d)).collect();
     assert_eq!(depth, numbers(&want["depth"]), "{name}");

@@ -46,7 +46,7 @@ fn is_named_infrared(topic: &str) -> bool {
 }
 
 /// Topic of the raw image that a compressed one repeats.
-fn base_topic(topic: &str) -> &str {
+pub(super) fn base_topic(topic: &str) -> &str {
     ["/compressedDepth", "/compressed"]
         .iter()
         .find_map(|suffix| topic.strip_suffix(suffix))

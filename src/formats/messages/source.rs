@@ -2,6 +2,7 @@
 
 use super::container::MessageContainer;
 use super::fault::MessageFault;
+use super::frame_decoder::FrameDecoder;
 use super::pairing::NearestItem;
 use super::selection::{TopicWish, other_channels};
 use super::survey::Survey;
@@ -10,9 +11,7 @@ use crate::FormatError;
 use crate::rgbd_folder::read_camera;
 use crate::rgbd_source::{MAX_COLOR_GAP_NS, RgbdSource};
 use std::path::{Path, PathBuf};
-use tryon_geometry::camera::{
-    Calibration, ColorImage, DepthImage, Intrinsics, LensCalibration, RgbdFrame,
-};
+use tryon_geometry::camera::{Calibration, ColorImage, LensCalibration, RgbdFrame};
 
 /// Opens a container at its start.
 pub(crate) type OpenContainer = fn(&Path) -> Result<Box<dyn MessageContainer>, FormatError>;
@@ -34,8 +33,6 @@ struct ChosenStreams {
     depth: String,
     color: Option<String>,
     times: TimeBase,
-    /// Metres of a unit of 16-bit depth.
-    depth_unit: f64,
 }
 
 impl ChosenStreams {
@@ -65,8 +62,7 @@ pub(crate) struct MessageSource {
     path: PathBuf,
     open: OpenContainer,
     streams: ChosenStreams,
-    calibration: Calibration,
-    lenses: LensCalibration,
+    decoder: FrameDecoder,
     notes: Vec<String>,
     /// Notes of opening; those of reading follow.
     opening_notes: usize,
@@ -119,7 +115,7 @@ impl MessageSource {
         options: StreamOptions<'_>,
     ) -> Result<Self, FormatError> {
         let survey = Survey::read(path, &mut *open(path)?)?;
-        let (streams, lenses, notes) = match Self::choose(path, &survey, options) {
+        let (streams, decoder, notes) = match Self::choose(path, &survey, options) {
             Ok(found) => found,
             // A message at fault is the likelier reason for what is missing.
             Err(e) => return Err(survey.fault.unwrap_or(e)),
@@ -130,12 +126,7 @@ impl MessageSource {
             open,
             depth,
             color,
-            calibration: Calibration {
-                depth: lenses.depth.intrinsics,
-                color: lenses.color.map(|c| c.intrinsics),
-                color_from_depth: lenses.color_from_depth,
-            },
-            lenses,
+            decoder,
             opening_notes: notes.len(),
             notes,
             streams,
@@ -146,12 +137,12 @@ impl MessageSource {
         })
     }
 
-    /// Streams, lenses and notes of a recording.
+    /// Streams, decoder and notes of a recording.
     fn choose(
         path: &Path,
         survey: &Survey,
         options: StreamOptions<'_>,
-    ) -> Result<(ChosenStreams, LensCalibration, Vec<String>), FormatError> {
+    ) -> Result<(ChosenStreams, FrameDecoder, Vec<String>), FormatError> {
         let named = |f: MessageFault| FormatError::field(path, f.field, f.why);
         let wish = TopicWish {
             depth: options.depth_topic,
@@ -188,9 +179,9 @@ impl MessageSource {
             } else {
                 TimeBase::Log
             },
-            depth_unit,
         };
-        Ok((streams, lenses, notes))
+        let decoder = FrameDecoder::new(path, lenses, depth_unit);
+        Ok((streams, decoder, notes))
     }
 
     /// The next depth image, and the time of the one after it.
@@ -221,29 +212,15 @@ impl MessageSource {
         let Some(stream) = &mut self.color else {
             return Ok(None);
         };
-        let next = || match stream.next_image() {
+        let next = |_| match stream.next_image() {
             Ok(image) => Ok(image.map(|i| (i.time_ns, i))),
             // The depth reader reports the same damage.
             Err(_) if stream.is_ended() => Ok(None),
             Err(e) => Err(e),
         };
         let neighbours = [self.behind_ns.replace(time_ns), next_ns];
-        let Some(paired) = self.nearest.pair(time_ns, neighbours, next)? else {
-            return Ok(None);
-        };
-        let fault = |f: MessageFault| paired.head.error(&self.path, f);
-        let color = paired.image.color().map_err(fault)?;
-        let camera = self.calibration.color.unwrap_or(self.calibration.depth);
-        check_camera("color size", (color.width(), color.height()), &camera).map_err(fault)?;
-        Ok(Some(color))
-    }
-
-    fn depth_of(&self, depth: &TimedImage) -> Result<DepthImage, FormatError> {
-        let fault = |f: MessageFault| depth.head.error(&self.path, f);
-        let image = depth.image.depth(self.streams.depth_unit).map_err(fault)?;
-        let size = (image.width(), image.height());
-        check_camera("depth size", size, &self.calibration.depth).map_err(fault)?;
-        Ok(image)
+        let paired = self.nearest.pair(time_ns, neighbours, next)?;
+        paired.map(|image| self.decoder.color(image)).transpose()
     }
 
     /// Notes topics that begin late, frames without colour, and a file that is cut short.
@@ -276,25 +253,12 @@ impl MessageSource {
     }
 }
 
-/// Checks the size of an image against its camera.
-fn check_camera(field: &str, size: (u32, u32), camera: &Intrinsics) -> Result<(), MessageFault> {
-    if size == (camera.width, camera.height) {
-        return Ok(());
-    }
-    let (width, height) = size;
-    let why = format!(
-        "{width}×{height}, but the calibration says {}×{}",
-        camera.width, camera.height
-    );
-    Err(MessageFault::new(field, why))
-}
-
 impl RgbdSource for MessageSource {
     fn calibration(&self) -> &Calibration {
-        &self.calibration
+        self.decoder.calibration()
     }
     fn lenses(&self) -> LensCalibration {
-        self.lenses.clone()
+        self.decoder.lenses()
     }
     fn untaken(&self) -> &[String] {
         &self.notes
@@ -313,7 +277,7 @@ impl RgbdSource for MessageSource {
         Ok(Some(RgbdFrame {
             sequence: self.counts.number(stated),
             time_ns: depth.time_ns,
-            depth: self.depth_of(&depth)?,
+            depth: self.decoder.depth(&depth)?,
             color,
         }))
     }

@@ -106,7 +106,8 @@ impl Survey {
         Ok(survey)
     }
 
-    fn insert(&mut self, head: &MessageHead, item: MessageItem<'_>) {
+    /// Adds the content of a message.
+    pub(super) fn insert(&mut self, head: &MessageHead, item: MessageItem<'_>) {
         match item {
             MessageItem::Image(image) => self.insert_image(head, &image),
             MessageItem::Camera(info) => self.insert_camera(head, info),

@@ -4,7 +4,7 @@ use super::container::{MessageContainer, MessageHead, TopicChannel};
 use super::image_message::ImageMessage;
 use super::message_item::MessageItem;
 use crate::FormatError;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Clock of a recording's images.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -21,6 +21,34 @@ pub(super) struct TimedImage {
     pub(super) time_ns: u64,
     pub(super) head: MessageHead,
     pub(super) image: ImageMessage<'static>,
+}
+
+impl TimedImage {
+    /// Decodes a message all but its pixels; `None` for one that is no image.
+    ///
+    /// # Errors
+    /// A field that is cut short or no text.
+    pub(super) fn decode(
+        head: MessageHead,
+        data: &[u8],
+        times: TimeBase,
+        origin: &Path,
+    ) -> Result<Option<Self>, FormatError> {
+        let decoded = head.channel.decode(data);
+        let item = decoded.map_err(|fault| head.error(origin, fault))?;
+        let Some(MessageItem::Image(image)) = item else {
+            return Ok(None);
+        };
+        let time_ns = match times {
+            TimeBase::Stamp => image.stamp_ns.unwrap_or(head.log_time_ns),
+            TimeBase::Log => head.log_time_ns,
+        };
+        Ok(Some(Self {
+            time_ns,
+            head,
+            image: image.into_owned(),
+        }))
+    }
 }
 
 /// Reader of one topic's images, with memory for one.
@@ -70,18 +98,9 @@ impl TopicImages {
             let read = self.container.next_message(&is_wanted, &mut self.buffer);
             self.is_ended = !matches!(read, Ok(Some(_)));
             let Some(head) = read? else { break };
-            let decoded = head.channel.decode(&self.buffer);
-            let item = decoded.map_err(|fault| head.error(&self.path, fault))?;
-            if let Some(MessageItem::Image(image)) = item {
-                let time_ns = match self.times {
-                    TimeBase::Stamp => image.stamp_ns.unwrap_or(head.log_time_ns),
-                    TimeBase::Log => head.log_time_ns,
-                };
-                return Ok(Some(TimedImage {
-                    time_ns,
-                    head,
-                    image: image.into_owned(),
-                }));
+            let image = TimedImage::decode(head, &self.buffer, self.times, &self.path)?;
+            if image.is_some() {
+                return Ok(image);
             }
         }
         Ok(None)

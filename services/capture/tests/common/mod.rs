@@ -1,4 +1,5 @@
 //! The service as a process, and its client.
+#![allow(dead_code)] // each test uses a part
 
 use std::io::{BufRead, BufReader};
 use std::path::Path;
@@ -20,11 +21,20 @@ pub(crate) type Client = CaptureServiceClient<tonic::transport::Channel>;
 
 /// The service after a line of shell, with a source for camera `front`; its gRPC URL. Recordings go into `folder`.
 pub(crate) fn start(folder: &Path, before: &str, source: &str) -> (Process, String) {
-    start_camera(folder, before, &format!("source=\"{source}\""))
+    launch(folder, before, &format!("source=\"{source}\""), &[])
 }
 
 /// As [`start`], with keys of the camera.
-pub(crate) fn start_camera(folder: &Path, before: &str, keys: &str) -> (Process, String) {
+pub(crate) fn start_camera(folder: &Path, keys: &str) -> (Process, String) {
+    launch(folder, "", keys, &[])
+}
+
+/// The service as [`start`] starts it, with more of configuration.
+pub(crate) fn start_with(folder: &Path, source: &str, more: &[String]) -> (Process, String) {
+    launch(folder, "", &format!("source=\"{source}\""), more)
+}
+
+fn launch(folder: &Path, before: &str, keys: &str, more: &[String]) -> (Process, String) {
     let set = [
         "capture.address=127.0.0.1:0".to_owned(),
         "capture.admin=127.0.0.1:0".to_owned(),
@@ -38,7 +48,7 @@ pub(crate) fn start_camera(folder: &Path, before: &str, keys: &str) -> (Process,
     let mut command = Command::new("sh");
     let shell = format!("{before} exec \"$0\" \"$@\"");
     command.args(["-c", &shell, env!("CARGO_BIN_EXE_tryon-capture")]);
-    for s in &set {
+    for s in set.iter().chain(more) {
         command.args(["--set", s]);
     }
     let mut child = command.stdout(Stdio::piped()).spawn().expect("started");

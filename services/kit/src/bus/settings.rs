@@ -7,6 +7,7 @@ use crate::server::StartError;
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
 use std::path::Path;
+use std::time::Duration;
 use zeroize::Zeroizing;
 
 /// Time that a stalled peer may block the others [µs]; then its connection is closed and reopened. zenoh's default of
@@ -16,6 +17,8 @@ const WAIT_BEFORE_CLOSE_US: u32 = 300_000;
 const LEASE_MS: u32 = 2_000;
 /// First and longest pause between attempts to connect (ms): a restarted peer is found within a second.
 const RETRY_MS: (u32, u32) = (100, 500);
+/// Largest message of another network, bytes: an uncompressed colour image of 4096 × 4096 has 48 MiB.
+const MAX_FOREIGN: usize = 64 << 20;
 
 /// Ends of the bus that a process is: `tcp/ADDRESS:PORT`, `tls/HOST:PORT` or `unixsock-stream/PATH`.
 #[derive(Clone, Copy)]
@@ -88,6 +91,39 @@ fn of_file(file: &Path) -> Result<zenoh::Config, BusError> {
     zenoh::Config::from_file(file).map_err(|e| BusError(format!("{}: {e}", file.display())))
 }
 
+/// Sets keys of a configuration to JSON5.
+fn set(
+    c: &mut zenoh::Config,
+    settings: impl IntoIterator<Item = (&'static str, String)>,
+) -> Result<(), BusError> {
+    settings.into_iter().try_for_each(|(key, value)| {
+        c.insert_json5(key, &value)
+            .map_err(|e| BusError(format!("{key} = {value}: {e}")))
+    })
+}
+
+/// Configuration of a client of another network of zenoh than the bus, such as that of ROS 2 cameras. Opening it fails
+/// where nobody answers within `patience`; once open, it connects again and again.
+///
+/// # Errors
+/// Names a malformed endpoint.
+pub fn client_elsewhere(endpoint: &str, patience: Duration) -> Result<zenoh::Config, BusError> {
+    let endpoint = [endpoint.to_owned()];
+    let mut c = settings(zenoh::Config::default(), "client", &[], &endpoint)?;
+    set(
+        &mut c,
+        [
+            ("connect/timeout_ms", patience.as_millis().to_string()),
+            ("connect/exit_on_failure", "true".into()),
+            (
+                "transport/link/rx/max_message_size",
+                MAX_FOREIGN.to_string(),
+            ),
+        ],
+    )?;
+    Ok(c)
+}
+
 /// Configuration of one session of zenoh.
 pub(super) fn settings(
     mut c: zenoh::Config,
@@ -114,10 +150,7 @@ pub(super) fn settings(
             WAIT_BEFORE_CLOSE_US.to_string(),
         ),
     ];
-    for (key, value) in &settings {
-        c.insert_json5(key, value)
-            .map_err(|e| BusError(format!("{key} = {value}: {e}")))?;
-    }
+    set(&mut c, settings)?;
     Ok(c)
 }
 

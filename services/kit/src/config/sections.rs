@@ -188,14 +188,26 @@ settings! {
         pub recordings: PathBuf = PathBuf::new(),
         /// The cameras.
         pub cameras: Vec<CameraConfig> = vec![CameraConfig::default()],
+        /// Network of the cameras whose source is `ros2:…`.
+        pub ros2: Ros2Config = Ros2Config::default(),
+    }
+
+    /// Zenoh network of ROS 2 cameras: `rmw_zenoh`, or `zenoh-bridge-ros2dds`. It is none of the bus.
+    pub struct Ros2Config {
+        /// Endpoints of its router or bridge, of which the first that answers is taken.
+        pub connect: Vec<String> = vec!["tcp/127.0.0.1:7447".to_owned()],
+        /// ROS_DOMAIN_ID of the cameras, which keys of `rmw_zenoh` begin with.
+        pub domain: u32 = 0,
+        /// Namespace that the bridge puts before all topics, such as `robot1`; empty for none.
+        pub namespace: String = String::new(),
     }
 
     /// One camera.
     pub struct CameraConfig {
         /// Camera part of the bus keys.
         pub name: String = "front".into(),
-        /// `synth`, `synth:CLIP`, `pattern` (a test picture), `push` (a program feeds it), a device as `freenect:SERIAL`,
-        /// `openni:SERIAL` or `v4l2:SERIAL`, or the path of a recording.
+        /// `synth`, `synth:CLIP`, `pattern` (a test picture), `push` (a program feeds it), `ros2:DEPTH_TOPIC,COLOR_TOPIC` (the
+        /// second may be left out), a device as `freenect:SERIAL`, `openni:SERIAL` or `v4l2:SERIAL`, or the path of a recording.
         pub source: String = "synth".into(),
         /// `camera.json` of a device or recording that has no calibration of its own; empty for its own.
         pub camera: PathBuf = PathBuf::new(),
@@ -312,6 +324,26 @@ impl CameraConfig {
     /// The given calibration, if any.
     pub fn camera_file(&self) -> Option<&Path> {
         Some(self.camera.as_path()).filter(|p| !p.as_os_str().is_empty())
+    }
+}
+
+impl Ros2Config {
+    /// Highest ROS_DOMAIN_ID: DDS has no ports for others.
+    const MAX_DOMAIN: u32 = 232;
+
+    /// First key at fault, and the fault.
+    pub(super) fn fault(&self) -> Option<(&'static str, &'static str)> {
+        let is_endpoint = |e: &String| e.split_once('/').is_some_and(|(_, a)| !a.is_empty());
+        let is_name = |c: char| c.is_ascii_alphanumeric() || matches!(c, '_' | '/');
+        if self.connect.is_empty() || !self.connect.iter().all(is_endpoint) {
+            let why = "endpoints such as tcp/127.0.0.1:7447 are needed";
+            return Some(("capture.ros2.connect", why));
+        }
+        if self.domain > Self::MAX_DOMAIN {
+            return Some(("capture.ros2.domain", "0 to 232"));
+        }
+        let why = "letters, digits, _ and / are needed, such as robot1";
+        (!self.namespace.chars().all(is_name)).then_some(("capture.ros2.namespace", why))
     }
 }
 

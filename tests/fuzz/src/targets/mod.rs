@@ -4,6 +4,7 @@ mod bodies;
 mod device_recordings;
 mod garments;
 mod images;
+mod live;
 mod meshes;
 mod recordings;
 mod secrets;
@@ -105,6 +106,7 @@ pub const TARGETS: &[Target] = &[
     device_recordings::KINECT,
     device_recordings::RECORD3D,
     device_recordings::ARRAYS,
+    live::LIVE,
     secrets::TOKEN,
     secrets::SEALED,
     settings::CONFIG,
