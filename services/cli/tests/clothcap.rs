@@ -189,7 +189,7 @@ fn a_recording_or_scans_are_wanted_and_recordings_without_people_are_refused_by_
     let topic = capture(&["--scans", "a", "--depth-topic", "/depth"]);
     let err = String::from_utf8_lossy(&topic.stderr).into_owned();
     assert_eq!(topic.status.code(), Some(2), "{err}");
-    assert!(err.contains("--input"), "{err}");
+    assert!(err.contains("--depth-topic"), "{err}");
 
     let setting = Setting {
         routine: Routine::Empty,

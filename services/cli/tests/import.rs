@@ -223,6 +223,14 @@ fn another_recording_or_other_options_do_not_continue_a_copy() {
 }
 
 #[test]
+fn recordings_are_exported_to_mcap_only() {
+    let dir = tempfile::tempdir().unwrap();
+    let (recording, out) = (dir.path().join("a.mkv"), dir.path().join("a.obj"));
+    let e = refused(&mut command("export", &recording, &out));
+    assert!(e.contains("a.mkv") && e.contains(".mcap"), "{e}");
+}
+
+#[test]
 fn files_of_others_are_left_alone() {
     let dir = tempfile::tempdir().unwrap();
     let input = recording(&dir.path().join("in"));
@@ -243,7 +251,8 @@ fn files_of_others_are_left_alone() {
 fn two_imports_do_not_write_one_copy() {
     let dir = tempfile::tempdir().unwrap();
     let input = recording(&dir.path().join("in"));
-    let (out, journal) = (dir.path().join("a.mcap"), dir.path().join("a.journal"));
+    let folder = dir.path().join("made/on the way");
+    let (out, journal) = (folder.join("a.mcap"), folder.join("a.journal"));
     let first = until(&mut command("import", &input, &out), &journal, 2);
     let e = refused(&mut command("import", &input, &out));
     assert!(e.contains("another import writes this copy"), "{e}");

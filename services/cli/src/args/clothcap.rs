@@ -102,13 +102,12 @@ pub(crate) struct ClothcapSegmentArgs {
 
 #[derive(Debug, Args)]
 #[command(group(clap::ArgGroup::new("source").required(true).args(["scans", "input"])))]
-#[command(mut_group("RecordingArgs", |g| g.requires("input")))]
 pub(crate) struct ClothcapCaptureArgs {
     /// A scan (.ply, .obj, .glb, .gltf), or a folder of them: a sequence.
-    #[arg(long, value_name = "DIR|FILE")]
+    #[arg(long, value_name = "DIR|FILE", conflicts_with = "RecordingArgs")]
     pub(crate) scans: Option<PathBuf>,
-    /// A recording (any that `tryon run` reads) of one colour and depth camera before which the subject turns around once; one frame
-    /// gives what it shows, completed from the body.
+    /// A recording (any that `tryon run` reads) of one colour and depth camera before which the subject turns around once;
+    /// one frame gives what it shows, completed from the body.
     #[arg(long, value_name = "REC", conflicts_with = "unit")]
     pub(crate) input: Option<PathBuf>,
     #[command(flatten)]

@@ -8,6 +8,7 @@ use std::process::ExitCode;
 use tryon::body::{BoneTransforms, Pose, embedded};
 use tryon::cloth;
 use tryon::dressing::{DressOptions, dress};
+use tryon::formats::RECORDING_EXTENSIONS;
 use tryon::formats::gltf::{GlbMesh, write_glb, write_glb_motion};
 use tryon::formats::obj::write_obj;
 use tryon::garment::{GarmentMesh, Pattern, Size, Triangulation, library};
@@ -41,6 +42,11 @@ pub(crate) fn run(args: &ExportArgs) -> Result<ExitCode> {
             texture: &[],
         };
         write_mesh(out, body)?;
+    } else if RECORDING_EXTENSIONS
+        .iter()
+        .any(|e| what.ends_with(&format!(".{e}")))
+    {
+        bail!("{what}: a recording is exported to an .mcap file")
     } else {
         let size: Size = args.size.parse()?;
         let pattern = library::pattern(what, size)?;

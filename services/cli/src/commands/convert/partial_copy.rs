@@ -2,6 +2,7 @@
 
 use super::journal::{Journal, Origin};
 use crate::commands::record::Sink;
+use crate::input;
 use anyhow::{Context, Result, ensure};
 use std::path::{Path, PathBuf};
 use tryon::geometry::camera::{Calibration, RgbdFrame};
@@ -21,6 +22,9 @@ impl PartialCopy {
     /// `out` exists, a partial copy of another origin or of a process that runs, or files that cannot be written.
     pub(super) fn open(out: &Path, origin: &Origin, calibration: &Calibration) -> Result<Self> {
         ensure!(is_free(out), "{} exists already", out.display());
+        if let Some(parent) = out.parent().filter(|p| !p.as_os_str().is_empty()) {
+            input::create_dir(parent)?;
+        }
         let [part, next, journal] = ["part", "next", "journal"].map(|kind| beside(out, kind));
         let mut journal = Journal::open(&journal, &part, origin)?;
         let frames = journal.frames();
