@@ -23,6 +23,7 @@
 mod asf_amc;
 mod bag_file;
 mod bvh;
+mod camera_json;
 mod chunk_records;
 mod depth_metres;
 mod error;
@@ -61,6 +62,7 @@ mod sibling;
 mod texture_points;
 mod zip_entries;
 
+pub use camera_json::CameraFile;
 pub use error::FormatError;
 pub use k4a_file::K4aReader;
 pub use mcap_file::McapWriter;

@@ -3,7 +3,7 @@
 use anyhow::Result;
 use clap::Args;
 use std::path::{Path, PathBuf};
-use tryon::formats::{FormatError, RecordingOptions, RgbdSource, open_recording_with};
+use tryon::formats::{CameraFile, FormatError, RecordingOptions, RgbdSource, open_recording_with};
 use tryon::geometry::camera::{Calibration, RgbdFrame};
 
 /// Choices that a recording may leave to the reader.
@@ -63,6 +63,12 @@ impl RgbdSource for Told {
     }
     fn untaken(&self) -> &[String] {
         self.source.untaken()
+    }
+    fn camera_file(&self) -> CameraFile {
+        self.source.camera_file()
+    }
+    fn color_time_ns(&self) -> Option<u64> {
+        self.source.color_time_ns()
     }
     fn len(&self) -> Option<usize> {
         self.source.len()

@@ -6,9 +6,9 @@ use super::pairing::NearestItem;
 use super::selection::{TopicWish, other_channels};
 use super::survey::Survey;
 use super::topic_images::{TimeBase, TimedImage, TopicImages};
-use crate::FormatError;
-use crate::rgbd_folder::read_camera;
+use crate::pinholes::pinholes;
 use crate::rgbd_source::{MAX_COLOR_GAP_NS, RgbdSource};
+use crate::{CameraFile, FormatError};
 use std::path::{Path, PathBuf};
 use tryon_geometry::camera::{
     Calibration, ColorImage, DepthImage, Intrinsics, LensCalibration, RgbdFrame,
@@ -36,6 +36,8 @@ struct ChosenStreams {
     times: TimeBase,
     /// Metres of a unit of 16-bit depth.
     depth_unit: f64,
+    /// Time added to colour's stamps, nanoseconds.
+    color_offset_ns: i64,
 }
 
 impl ChosenStreams {
@@ -66,7 +68,7 @@ pub(crate) struct MessageSource {
     open: OpenContainer,
     streams: ChosenStreams,
     calibration: Calibration,
-    lenses: LensCalibration,
+    camera: CameraFile,
     notes: Vec<String>,
     /// Notes of opening; those of reading follow.
     opening_notes: usize,
@@ -77,6 +79,8 @@ pub(crate) struct MessageSource {
     behind_ns: Option<u64>,
     color: Option<TopicImages>,
     nearest: NearestItem<TimedImage>,
+    /// Capture time of the last frame's colour, nanoseconds.
+    color_time_ns: Option<u64>,
     counts: FrameCounts,
 }
 
@@ -119,7 +123,7 @@ impl MessageSource {
         options: StreamOptions<'_>,
     ) -> Result<Self, FormatError> {
         let survey = Survey::read(path, &mut *open(path)?)?;
-        let (streams, lenses, notes) = match Self::choose(path, &survey, options) {
+        let (streams, camera, notes) = match Self::choose(path, &survey, options) {
             Ok(found) => found,
             // A message at fault is the likelier reason for what is missing.
             Err(e) => return Err(survey.fault.unwrap_or(e)),
@@ -130,18 +134,15 @@ impl MessageSource {
             open,
             depth,
             color,
-            calibration: Calibration {
-                depth: lenses.depth.intrinsics,
-                color: lenses.color.map(|c| c.intrinsics),
-                color_from_depth: lenses.color_from_depth,
-            },
-            lenses,
+            calibration: pinholes(&camera.lenses),
+            camera,
             opening_notes: notes.len(),
             notes,
             streams,
             ahead: None,
             behind_ns: None,
             nearest: NearestItem::new(),
+            color_time_ns: None,
             counts: FrameCounts::default(),
         })
     }
@@ -151,7 +152,7 @@ impl MessageSource {
         path: &Path,
         survey: &Survey,
         options: StreamOptions<'_>,
-    ) -> Result<(ChosenStreams, LensCalibration, Vec<String>), FormatError> {
+    ) -> Result<(ChosenStreams, CameraFile, Vec<String>), FormatError> {
         let named = |f: MessageFault| FormatError::field(path, f.field, f.why);
         let wish = TopicWish {
             depth: options.depth_topic,
@@ -159,19 +160,21 @@ impl MessageSource {
         };
         let mut selection = survey.select(wish).map_err(named)?;
         let mut notes = std::mem::take(&mut selection.notes);
-        let (lenses, depth_unit) = match options.camera {
+        let camera: CameraFile = match options.camera {
             Some(camera) => {
-                let (calibration, scale) = read_camera(camera)?;
                 if !survey.cameras.is_empty() {
                     let why = "not taken, --camera is";
                     notes.push(format!("cameras of the recording: {why}"));
                 }
-                (calibration.into(), scale.recip())
+                CameraFile::read(camera)?
             }
             None => {
                 let found = survey.calibrate(&selection).map_err(named)?;
                 notes.extend(found.notes);
-                (found.lenses, found.depth_unit)
+                CameraFile {
+                    depth_scale: found.depth_unit.recip(),
+                    ..found.lenses.into()
+                }
             }
         };
         let (depth, color) = (selection.depth, selection.color);
@@ -188,9 +191,10 @@ impl MessageSource {
             } else {
                 TimeBase::Log
             },
-            depth_unit,
+            depth_unit: camera.depth_scale.recip(),
+            color_offset_ns: camera.color_time_offset_ns(),
         };
-        Ok((streams, lenses, notes))
+        Ok((streams, camera, notes))
     }
 
     /// The next depth image, and the time of the one after it.
@@ -221,8 +225,10 @@ impl MessageSource {
         let Some(stream) = &mut self.color else {
             return Ok(None);
         };
+        self.color_time_ns = None;
+        let offset = self.streams.color_offset_ns;
         let next = || match stream.next_image() {
-            Ok(image) => Ok(image.map(|i| (i.time_ns, i))),
+            Ok(image) => Ok(image.map(|i| (i.time_ns.saturating_add_signed(offset), i))),
             // The depth reader reports the same damage.
             Err(_) if stream.is_ended() => Ok(None),
             Err(e) => Err(e),
@@ -231,6 +237,7 @@ impl MessageSource {
         let Some(paired) = self.nearest.pair(time_ns, neighbours, next)? else {
             return Ok(None);
         };
+        self.color_time_ns = Some(paired.time_ns.saturating_add_signed(offset));
         let fault = |f: MessageFault| paired.head.error(&self.path, f);
         let color = paired.image.color().map_err(fault)?;
         let camera = self.calibration.color.unwrap_or(self.calibration.depth);
@@ -294,7 +301,13 @@ impl RgbdSource for MessageSource {
         &self.calibration
     }
     fn lenses(&self) -> LensCalibration {
-        self.lenses.clone()
+        self.camera.lenses.clone()
+    }
+    fn camera_file(&self) -> CameraFile {
+        self.camera.clone()
+    }
+    fn color_time_ns(&self) -> Option<u64> {
+        self.color_time_ns
     }
     fn untaken(&self) -> &[String] {
         &self.notes

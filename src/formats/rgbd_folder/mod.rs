@@ -1,6 +1,5 @@
 //! RGBD folders: `camera.json`, `depth/*.png`, colour in `rgb/` or `color/`, and time lists as in the TUM RGB-D benchmark.
 
-mod camera_json;
 mod datasets;
 mod index;
 mod names;
