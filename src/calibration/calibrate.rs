@@ -2,7 +2,7 @@
 
 use super::deviation::Deviations;
 use super::error::ExtrinsicsError;
-use super::evidence::Evidence;
+use super::evidence::WalkEvidence;
 use super::settings::ExtrinsicsSettings;
 use super::solve::{Solution, solve};
 use super::survey::{CameraPair, EmptyScene, SceneSurvey};
@@ -106,11 +106,11 @@ fn gather(
     scene: &EmptyScene,
     total: usize,
     settings: &ExtrinsicsSettings,
-) -> Result<Evidence, ExtrinsicsError> {
+) -> Result<WalkEvidence, ExtrinsicsError> {
     let bursts = (settings.frames / settings.burst.max(1)).max(1);
     let period = total.div_ceil(bursts).max(settings.burst);
     let is_all = total <= settings.frames;
-    let mut evidence = Evidence::new(cameras);
+    let mut evidence = WalkEvidence::new(cameras);
     let mut number = 0;
     for_each_frame(source, |frame, color_time| {
         if is_all || number % period < settings.burst {

@@ -15,7 +15,7 @@ const STRIDE: usize = 3;
 /// Frames of which a median is taken; where the person is elsewhere in fewer, it is of all.
 const LEAST_FREE: usize = 5;
 
-/// Where the person is in one colour image, cell by cell, with the margin that the unknown extrinsics need.
+/// Cells of one colour image that the person covers, with the margin that the unknown extrinsics need.
 #[derive(Clone, Debug)]
 pub(crate) struct CoveredCells {
     columns: usize,

@@ -1,7 +1,7 @@
 //! Standard deviations of the estimate, and unknowns that the motion does not determine.
 
 use super::axis::ExtrinsicAxis;
-use super::evidence::Evidence;
+use super::evidence::WalkEvidence;
 use super::residual::{TIME, UNKNOWNS};
 use super::settings::ExtrinsicsSettings;
 use super::solve::{NormalMatrix, Solution};
@@ -23,7 +23,7 @@ impl Deviations {
     /// outline counts as a few pieces, and once for every new place.
     pub(crate) fn new(
         solution: &Solution,
-        evidence: &Evidence,
+        evidence: &WalkEvidence,
         settings: &ExtrinsicsSettings,
     ) -> Self {
         let independent = settings.outline_pieces * places(evidence, settings.new_place);
@@ -52,7 +52,7 @@ impl Deviations {
 }
 
 /// Times that the person came to a new place.
-fn places(evidence: &Evidence, displacement: f64) -> f64 {
+fn places(evidence: &WalkEvidence, displacement: f64) -> f64 {
     let mut last: Option<P3d> = None;
     let mut count = 0.0;
     for (_, outline) in &evidence.outlines {

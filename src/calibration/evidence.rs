@@ -2,7 +2,7 @@
 
 use super::binned;
 use super::change::{ChangeImage, LEVELS};
-use super::outline::{Outline, outline};
+use super::outline::{PersonOutline, outline};
 use super::settings::ExtrinsicsSettings;
 use super::survey::{CameraPair, EmptyScene};
 use tryon_geometry::camera::{Intrinsics, RgbdFrame};
@@ -14,11 +14,11 @@ const NANO: f64 = 1e-9;
 
 /// Outlines and changes of a recording.
 #[derive(Clone, Debug)]
-pub(crate) struct Evidence {
+pub(crate) struct WalkEvidence {
     /// Colour cameras of the levels of change images.
     pub(crate) cameras: [Intrinsics; LEVELS],
     /// By time (s).
-    pub(crate) outlines: Vec<(f64, Outline)>,
+    pub(crate) outlines: Vec<(f64, PersonOutline)>,
     /// By time (s).
     pub(crate) changes: Vec<(f64, ChangeImage)>,
     /// Frames compared.
@@ -34,7 +34,7 @@ pub(crate) struct ChangeBracket<'a> {
     pub(crate) gap: f64,
 }
 
-impl Evidence {
+impl WalkEvidence {
     pub(crate) fn new(cameras: &CameraPair) -> Self {
         let half = |k: Intrinsics| binned::camera(&k, 2);
         let (whole, halves) = (cameras.color, half(cameras.color));

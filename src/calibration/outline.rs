@@ -4,16 +4,16 @@ use super::depth_background::{DepthBackground, Pixel};
 use super::settings::ExtrinsicsSettings;
 use nalgebra::Vector2;
 use tryon_geometry::camera::{DepthImage, Intrinsics};
-use tryon_geometry::math::order_statistics::quantile;
+use tryon_geometry::math::order_statistics::median;
 use tryon_geometry::math::{P3d, V3d};
 
 /// Margin of the image in which the outline is that of the image (depth pixels).
 const MARGIN: i32 = 6;
-/// Distance from the rim to the middle of the windows of 5 × 5 in which depth is read (depth pixels).
-const INSIDE: f32 = 2.5;
+/// Distances from the rim to the middles of the windows of 5 × 5 in which depth is read (depth pixels).
+const INSIDE: [f32; 2] = [2.5, 6.0];
 const OUTSIDE: f32 = 4.0;
-/// Share of the depths in a window that are nearer than the rim: skin bends away from the camera.
-const RIM: f64 = 0.7;
+/// Largest depth of the rim behind its first window (m).
+const MOST_BEND: f32 = 0.12;
 /// Readings that a window needs.
 const LEAST_READINGS: usize = 6;
 /// Share of readings around a rim point that are known; a shadow of the projector leaves fewer.
@@ -31,7 +31,7 @@ pub(crate) struct RimPoint {
 
 /// Outline of one frame.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct Outline {
+pub(crate) struct PersonOutline {
     pub(crate) points: Vec<RimPoint>,
     /// Middle of the rim, metres.
     pub(crate) centre: P3d,
@@ -42,7 +42,7 @@ pub(crate) fn outline(
     depth: &DepthImage,
     scene: &DepthBackground,
     settings: &ExtrinsicsSettings,
-) -> Option<Outline> {
+) -> Option<PersonOutline> {
     let mask = scene.person(depth);
     if mask.is_empty() {
         return None;
@@ -60,7 +60,7 @@ pub(crate) fn outline(
     let points: Vec<RimPoint> = points.into_iter().step_by(stride).collect();
     let sum: V3d = points.iter().map(|p| p.point.coords).sum();
     let centre = P3d::from(sum / points.len().max(1) as f64);
-    (!points.is_empty()).then_some(Outline { points, centre })
+    (!points.is_empty()).then_some(PersonOutline { points, centre })
 }
 
 /// Depth image with its mask.
@@ -75,7 +75,7 @@ impl MaskedDepth<'_> {
     /// Place in space of an image point on the rim, if the scene is far behind it.
     fn rim_point(&self, at: Vector2<f32>, outward: Vector2<f32>) -> Option<RimPoint> {
         let k = self.scene.camera();
-        let z = self.depth_inside(at - outward * INSIDE)?;
+        let z = self.rim_depth(at, outward)?;
         let far = self.far_outside(at + outward * OUTSIDE)?;
         if far < z + self.behind {
             return None;
@@ -86,8 +86,18 @@ impl MaskedDepth<'_> {
         Some(RimPoint { point, tangent })
     }
 
-    /// Depth of the person's rim next to an image point, metres.
-    fn depth_inside(&self, at: Vector2<f32>) -> Option<f32> {
+    /// Depth of the person at the rim, metres. Skin bends away from the camera there: the depth of a round limb is that
+    /// of its rim less a multiple of the root of the distance to the rim, and two windows give both.
+    fn rim_depth(&self, at: Vector2<f32>, outward: Vector2<f32>) -> Option<f32> {
+        let [first, second] = INSIDE.map(|d| self.depth_around(at - outward * d));
+        let [near, far] = INSIDE.map(f32::sqrt);
+        let first = first?;
+        let bend = second.map_or(0.0, |second| (first - second) * near / (far - near));
+        Some(first + bend.clamp(0.0, MOST_BEND))
+    }
+
+    /// Depth of the person around an image point, metres.
+    fn depth_around(&self, at: Vector2<f32>) -> Option<f32> {
         let mut readings: Vec<f32> = self
             .window(at)
             .filter(|(i, ..)| self.mask[*i] == Pixel::Person)
@@ -96,7 +106,7 @@ impl MaskedDepth<'_> {
         if readings.len() < LEAST_READINGS {
             return None;
         }
-        quantile(&mut readings, RIM)
+        median(&mut readings)
     }
 
     /// Depth of the nearest scene around an image point, metres; `None` beside the image.
@@ -228,6 +238,32 @@ fn blur(image: Vec<f32>, width: usize, kernel: &[f32]) -> Vec<f32> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// An upright cylinder of 0.12 m radius whose axis is 2.4 m away: its rim is as far as the axis.
+    #[test]
+    fn the_rim_of_a_limb_is_behind_what_is_seen_of_it() {
+        let camera = Intrinsics::KINECT_V1;
+        let row: Vec<u16> = (0..640u16)
+            .map(|u| {
+                let x = (f64::from(u) - 319.5) / 525.0;
+                // |(x z, z − 2.4)| = 0.12
+                let (a, b) = (1.0 + x * x, 2.4);
+                let root = b * b - a * (2.4 * 2.4 - 0.12 * 0.12);
+                if root < 0.0 {
+                    return 4000;
+                }
+                (1e3 * (b - root.sqrt()) / a).round() as u16
+            })
+            .collect();
+        let image = DepthImage::new(640, 480, row.repeat(480)).expect("640×480");
+        let wall = DepthImage::new(640, 480, vec![4000; 640 * 480]).expect("640×480");
+        let settings = ExtrinsicsSettings::default();
+        let scene = DepthBackground::new(camera, &[&wall], &settings);
+        let found = outline(&image, &scene, &settings).expect("a limb");
+        for p in &found.points {
+            assert!((p.point.z - 2.4).abs() < 0.015, "{}", p.point);
+        }
+    }
 
     /// A disc of 0.5 m radius at 2 m before a wall at 3 m: its outline is a circle, at the depth of the disc.
     #[test]

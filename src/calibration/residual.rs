@@ -6,7 +6,7 @@
 //! v + ω × Q, hence ∂r/∂ξ = −nᵀ ∂u/∂Q (I, −Q×); ∂r/∂τ = −ṡ; ∂r/∂w = −1.
 
 use super::border::BorderSearch;
-use super::evidence::{ChangeBracket, Evidence};
+use super::evidence::{ChangeBracket, WalkEvidence};
 use super::outline::RimPoint;
 use nalgebra::{Isometry3, Point2, SVector, Vector2};
 use tryon_geometry::camera::Intrinsics;
@@ -66,7 +66,7 @@ pub(crate) struct Comparison {
 
 /// Residuals of the points of one outline that are met in colour.
 pub(crate) fn outline_rows(
-    evidence: &Evidence,
+    evidence: &WalkEvidence,
     outline: usize,
     unknowns: &Unknowns,
     comparison: &Comparison,

@@ -5,7 +5,7 @@
 //! absolute deviation leaves out borders of something else.
 
 use super::border::BorderSearch;
-use super::evidence::Evidence;
+use super::evidence::WalkEvidence;
 use super::residual::{
     Comparison, ResidualRow, TIME, UNKNOWNS, UnknownVector, Unknowns, WIDTH, outline_rows,
 };
@@ -54,7 +54,7 @@ pub(crate) struct Solution {
 
 /// Estimates all unknowns from `start`.
 pub(crate) fn solve(
-    evidence: &Evidence,
+    evidence: &WalkEvidence,
     start: &Isometry3<f64>,
     settings: &ExtrinsicsSettings,
 ) -> Solution {
@@ -99,7 +99,7 @@ pub(crate) fn solve(
 }
 
 /// Residuals of all outlines.
-fn all_rows(evidence: &Evidence, stage: &Stage, unknowns: &Unknowns) -> Vec<ResidualRow> {
+fn all_rows(evidence: &WalkEvidence, stage: &Stage, unknowns: &Unknowns) -> Vec<ResidualRow> {
     let mut rows: Vec<Vec<ResidualRow>> = Vec::new();
     par::map_into(Par::Rayon, evidence.outlines.len(), 1, &mut rows, |i| {
         outline_rows(evidence, i, unknowns, &stage.comparison)
@@ -108,18 +108,18 @@ fn all_rows(evidence: &Evidence, stage: &Stage, unknowns: &Unknowns) -> Vec<Resi
 }
 
 /// Mean over all outline points of the squared residual, at most one: missed points count as that.
-fn cost(evidence: &Evidence, stage: &Stage, unknowns: &Unknowns) -> f64 {
+fn cost(evidence: &WalkEvidence, stage: &Stage, unknowns: &Unknowns) -> f64 {
     let rows = all_rows(evidence, stage, unknowns);
     let gain = |r: &ResidualRow| 1.0 - (r.residual / MISSED).powi(2).min(1.0);
     1.0 - rows.iter().map(gain).sum::<f64>() / outline_points(evidence)
 }
 
-fn outline_points(evidence: &Evidence) -> f64 {
+fn outline_points(evidence: &WalkEvidence) -> f64 {
     let points = evidence.outlines.iter().map(|(_, o)| o.points.len());
     points.sum::<usize>().max(1) as f64
 }
 
-fn run(evidence: &Evidence, stage: &Stage, start: Unknowns) -> Solution {
+fn run(evidence: &WalkEvidence, stage: &Stage, start: Unknowns) -> Solution {
     let mut found = Solution {
         unknowns: start,
         normal: NormalMatrix::zeros(),

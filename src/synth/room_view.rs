@@ -23,15 +23,15 @@ pub(super) struct PaintedBody<'a> {
     pub(super) vertices: &'a [P3],
 }
 
-/// Lights in the frame of a camera, unit vectors.
-struct Lights {
+/// CameraLights in the frame of a camera, unit vectors.
+struct CameraLights {
     key: V3,
     fill: V3,
     up: V3,
     shade: [f32; 4],
 }
 
-impl Lights {
+impl CameraLights {
     fn new(world_from_camera: &Rigid<World, Camera>) -> Self {
         let settings = LightSettings::default();
         let camera_from_world = world_from_camera.inverse();
@@ -134,7 +134,7 @@ impl RoomView {
             let around = t.topology().vertex_faces();
             vertex_normals(Par::Seq, vertices, faces, around, &mut normals);
         }
-        let lights = Lights::new(&self.place);
+        let lights = CameraLights::new(&self.place);
         let mut color = color;
         let width = buffer.width as usize;
         for (i, (&id, &z)) in buffer.face.iter().zip(&buffer.depth).enumerate() {
