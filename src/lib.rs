@@ -84,6 +84,7 @@
 #![allow(rustdoc::private_intra_doc_links)] // the index of ideas names private modules
 
 pub use tryon_body as body;
+pub use tryon_calibration as calibration;
 pub use tryon_cloth as cloth;
 pub use tryon_clothcap as clothcap;
 pub use tryon_dressing as dressing;

@@ -24,6 +24,7 @@
 mod asf_amc;
 mod bag_file;
 mod bvh;
+mod camera_json;
 mod chunk_records;
 mod depth_metres;
 mod error;
@@ -63,6 +64,7 @@ mod sibling;
 mod texture_points;
 mod zip_entries;
 
+pub use camera_json::CameraFile;
 pub use error::FormatError;
 pub use k4a_file::K4aReader;
 pub use mcap_file::McapWriter;
@@ -77,7 +79,7 @@ pub use r3d_file::R3dReader;
 pub use recording::{RECORDING_EXTENSIONS, RecordingOptions, open_recording, open_recording_with};
 pub use rectified::Rectified;
 pub use reoriented::Reoriented;
-pub use rgbd_folder::{CameraFile, RgbdFolder, RgbdFolderWriter, depth_to_mm, read_camera};
+pub use rgbd_folder::{RgbdFolder, RgbdFolderWriter, depth_to_mm, read_camera};
 pub use rgbd_source::RgbdSource;
 pub use shared_data::shared_data;
 pub use texture_points::TexturePoint;

@@ -1,7 +1,7 @@
 //! Recording whose frames are rectified as they are read.
 
-use super::FormatError;
 use super::rgbd_source::RgbdSource;
+use super::{CameraFile, FormatError};
 use std::path::{Path, PathBuf};
 use tryon_geometry::camera::{Calibration, Rectifier, RgbdFrame};
 
@@ -33,6 +33,12 @@ impl RgbdSource for Rectified {
     }
     fn untaken(&self) -> &[String] {
         self.source.untaken()
+    }
+    fn camera_file(&self) -> CameraFile {
+        self.source.camera_file()
+    }
+    fn color_time_ns(&self) -> Option<u64> {
+        self.source.color_time_ns()
     }
     fn len(&self) -> Option<usize> {
         self.source.len()

@@ -1,6 +1,6 @@
 //! Interface of every recording: a calibration and frames in order.
 
-use super::FormatError;
+use super::{CameraFile, FormatError};
 use tryon_geometry::camera::{Calibration, LensCalibration, RgbdFrame};
 
 /// Largest time between colour and its depth, nanoseconds: half a period at 15 Hz, the slowest tracking rate. Older
@@ -18,9 +18,17 @@ pub trait RgbdSource: Send {
     fn lenses(&self) -> LensCalibration {
         self.calibration().clone().into()
     }
+    /// Calibration as recorded: distortion of the lenses, unit of depth, clock of colour.
+    fn camera_file(&self) -> CameraFile {
+        self.lenses().into()
+    }
     /// Topics and fields that the recording holds and no frame will have, and why.
     fn untaken(&self) -> &[String] {
         &[]
+    }
+    /// Capture time of the last frame's colour, nanoseconds, where the recording states it apart from depth's.
+    fn color_time_ns(&self) -> Option<u64> {
+        None
     }
     /// Number of frames, if known without reading them all.
     fn len(&self) -> Option<usize>;

@@ -11,7 +11,7 @@
 //!
 //! Evidence:
 //!
-//! - Synthetic people and their truth: [`mod@sequence`], [`mod@routine`], [`mod@posture`], [`mod@room`].
+//! - Synthetic people and their truth: [`mod@sequence`], [`mod@routine`], [`mod@posture`], [`mod@room`], drawn by [`mod@room_view`].
 #![allow(rustdoc::private_intra_doc_links)] // the index of ideas names private modules
 
 mod clip;
@@ -23,6 +23,7 @@ mod posture;
 #[cfg(test)]
 mod reoriented_tests;
 mod room;
+mod room_view;
 mod routine;
 mod sequence;
 mod settings;
@@ -36,7 +37,7 @@ pub use physique::{Belly, Covering, Physique};
 pub use posture::Posture;
 pub use room::Room;
 pub use routine::Routine;
-pub use sequence::{Actor, Sequence, Setting, Truth};
+pub use sequence::{Actor, SeparateColor, Sequence, Setting, Truth};
 pub use settings::{CoveringSettings, LightSettings, ShopSettings, StanceSettings};
 pub use shop::{PLACES, Shop};
 pub use source::SynthSource;

@@ -1,12 +1,11 @@
 //! Frames of a synthetic actor, with ground truth.
 
 use super::clip::{ClipError, Performance};
-use super::furniture::{NEAR, Piece};
 use super::paint::{Colors, Paint};
 use super::posture::Posture;
-use super::room::{Background, Room};
+use super::room::Room;
+use super::room_view::{PaintedBody, RoomView};
 use super::routine::Routine;
-use super::settings::LightSettings;
 use super::stance::Rig;
 use nalgebra::UnitQuaternion;
 use std::sync::Arc;
@@ -15,10 +14,8 @@ use tryon_formats::MotionClip;
 use tryon_geometry::camera::{
     Calibration, ColorImage, DepthImage, Intrinsics, NoiseModel, RgbdFrame,
 };
-use tryon_geometry::math::{Camera, P3, P3d, Rigid, V3, V3d, World};
-use tryon_geometry::mesh::vertex_normals;
+use tryon_geometry::math::{Camera, ColorCamera, P3, P3d, Rigid, V3d, World};
 use tryon_geometry::par::Par;
-use tryon_geometry::raster::{Cull, Options, View, VisibilityBuffer, barycentrics, rasterise_with};
 
 /// Person in front of the camera.
 #[derive(Clone, Debug)]
@@ -42,11 +39,24 @@ impl Default for Actor {
     }
 }
 
+/// Colour camera at its own place and time.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SeparateColor {
+    /// Its pinhole.
+    pub camera: Intrinsics,
+    /// From the depth camera to it.
+    pub color_from_depth: Rigid<ColorCamera, Camera>,
+    /// Time from the exposure of depth to that of the same frame's colour, seconds.
+    pub delay: f64,
+}
+
 /// Camera, room and routine.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Setting {
-    /// Depth and (registered) colour camera.
+    /// Depth camera, and that of colour unless it has its own.
     pub camera: Intrinsics,
+    /// Colour camera beside it; colour is registered to depth without one.
+    pub color_camera: Option<SeparateColor>,
     /// Pose of the camera; the world's floor is y = 0.
     pub world_from_camera: Rigid<World, Camera>,
     /// Start of the actor on the floor, world.
@@ -72,6 +82,7 @@ impl Default for Setting {
     fn default() -> Self {
         Self {
             camera: Intrinsics::KINECT_V1,
+            color_camera: None,
             world_from_camera: Self::tilted(1.0, 3.0, 0.0),
             home: P3d::new(0.0, 0.0, -2.4),
             turn: 0.0,
@@ -131,23 +142,20 @@ pub struct Sequence {
     rest: RestBody,
     rig: Rig,
     paint: Paint,
-    background: Background,
+    view: RoomView,
+    /// View and delay of a separate colour camera.
+    color_view: Option<(RoomView, f64)>,
     calibration: Calibration,
     performance: Option<Arc<Performance>>,
 }
 
-/// The room, with a chair under somebody who sits.
-fn background(setting: &Setting) -> Background {
-    let (camera, place) = (&setting.camera, &setting.world_from_camera);
-    let mut room = Room::draw(setting.room.as_ref(), camera, place);
+/// The room from a camera, with a chair under somebody who sits.
+fn room_view(setting: &Setting, camera: Intrinsics, place: Rigid<World, Camera>) -> RoomView {
+    let mut view = RoomView::new(setting.room.as_ref(), camera, place);
     if setting.routine == Routine::Hold(Posture::Sitting) {
-        let at = setting.home.cast::<f32>();
-        let chair = Piece::Chair
-            .surface()
-            .placed([at.x, 0.0, at.z], setting.turn as f32);
-        chair.seen_from(place).draw(camera, &mut room.depth);
+        view.place_chair(&setting.home, setting.turn);
     }
-    room
+    view
 }
 
 impl Sequence {
@@ -155,11 +163,20 @@ impl Sequence {
     pub fn new(actor: Actor, setting: Setting) -> Self {
         let t = &actor.template;
         let rest = t.personalise(&actor.shape);
+        let mut calibration = Calibration::registered(setting.camera);
+        let color_view = setting.color_camera.map(|c| {
+            calibration.color = Some(c.camera);
+            calibration.color_from_depth = c.color_from_depth;
+            let to_color = Rigid::new(*c.color_from_depth.inverse().iso());
+            let place = setting.world_from_camera * to_color;
+            (room_view(&setting, c.camera, place), c.delay)
+        });
         Self {
             rig: Rig::new(t.skeleton(), &rest),
             paint: Paint::new(t, &rest, Colors::pick(actor.appearance)),
-            background: background(&setting),
-            calibration: Calibration::registered(setting.camera),
+            view: room_view(&setting, setting.camera, setting.world_from_camera),
+            color_view,
+            calibration,
             rest,
             performance: None,
             actor,
@@ -191,16 +208,24 @@ impl Sequence {
     pub fn rest(&self) -> &RestBody {
         &self.rest
     }
-    /// Colour is registered to depth.
+    /// Calibration of depth and colour.
     pub fn calibration(&self) -> &Calibration {
         &self.calibration
     }
 
-    /// Truth of frame `i`.
+    /// Truth of frame `i`, at the time of its depth.
     pub fn truth(&self, i: u64) -> Truth {
+        self.truth_at(
+            i as f64 / self.setting.rate,
+            &self.setting.world_from_camera,
+        )
+    }
+
+    /// Truth at a time (s), in the frame of a camera.
+    fn truth_at(&self, time: f64, world_from_camera: &Rigid<World, Camera>) -> Truth {
         let t = &self.actor.template;
-        let camera_from_world = self.setting.world_from_camera.inverse();
-        let (time, home) = (i as f64 / self.setting.rate, self.setting.home);
+        let camera_from_world = world_from_camera.inverse();
+        let home = self.setting.home;
         let stance = match &self.performance {
             Some(p) => p.stance(&self.rig, home, time),
             None => self.setting.routine.stance(&self.rig, home, time),
@@ -231,32 +256,31 @@ impl Sequence {
     /// Depth of frame `i` before noise (metres along the optical axis, row-major, infinity for no surface), and its truth.
     pub fn surface_depth(&self, i: u64) -> (Vec<f32>, Truth) {
         let truth = self.truth(i);
-        let mut depth = self.background.depth.clone();
-        if truth.present {
-            self.draw(&truth, &mut depth, None);
-        }
+        let (depth, _) = self.view.draw(&self.body(&truth), false);
         (depth, truth)
     }
 
     /// Frame `i` and its truth.
     pub fn frame(&self, i: u64) -> (RgbdFrame, Truth) {
         let truth = self.truth(i);
-        let camera = &self.setting.camera;
-        let mut depth = self.background.depth.clone();
-        let mut color = self.setting.color.then(|| self.background.color.clone());
-        if truth.present {
-            if let Some(color) = &mut color {
-                self.cast_shadow(&truth, color);
-            }
-            self.draw(&truth, &mut depth, color.as_deref_mut());
+        let Setting {
+            camera,
+            color,
+            rate,
+            seed,
+            ..
+        } = &self.setting;
+        let is_registered = self.color_view.is_none();
+        let (depth, mut pixels) = self.view.draw(&self.body(&truth), *color && is_registered);
+        if let Some((view, delay)) = self.color_view.as_ref().filter(|_| *color) {
+            let then = self.truth_at(i as f64 / rate + delay, view.place());
+            pixels = view.draw(&self.body(&then), true).1;
         }
-        let depth: DepthImage = self
-            .setting
-            .noise
-            .apply(camera, &depth, self.setting.seed, i);
-        // The buffer has the background's size, which is the camera's.
-        let color = color.and_then(|c| ColorImage::new(camera.width, camera.height, c).ok());
-        let time_ns = (i as f64 * 1e9 / self.setting.rate).round() as u64;
+        let depth: DepthImage = self.setting.noise.apply(camera, &depth, *seed, i);
+        // The buffer has the size of the camera.
+        let Intrinsics { width, height, .. } = self.calibration.color.unwrap_or(*camera);
+        let color = pixels.and_then(|c| ColorImage::new(width, height, c).ok());
+        let time_ns = (i as f64 * 1e9 / rate).round() as u64;
         (
             RgbdFrame {
                 sequence: i,
@@ -268,108 +292,13 @@ impl Sequence {
         )
     }
 
-    fn draw(&self, truth: &Truth, depth: &mut [f32], color: Option<&mut [u8]>) {
-        let t = &self.actor.template;
-        let faces = t.mesh().faces();
-        let view = View::Perspective {
-            camera: self.setting.camera,
-            near: NEAR,
-        };
-        let mut buffer = VisibilityBuffer::default();
-        let options = Options {
-            par: Par::Seq,
-            cull: Cull::Back,
-            ..Options::default()
-        };
-        let vertices = &truth.vertices;
-        rasterise_with(options, &view, vertices, faces, &mut buffer);
-        let mut normals = Vec::new();
-        if color.is_some() {
-            let around = t.topology().vertex_faces();
-            vertex_normals(Par::Seq, vertices, faces, around, &mut normals);
-        }
-        let settings = LightSettings::default();
-        let camera_from_world = self.setting.world_from_camera.inverse();
-        let light = |d: [f64; 3]| {
-            camera_from_world
-                .vector(&V3d::from(d))
-                .normalize()
-                .cast::<f32>()
-        };
-        let (key, fill, up) = (
-            light(settings.key),
-            light(settings.fill),
-            light([0.0, 1.0, 0.0]),
-        );
-        let mut color = color;
-        let width = buffer.width as usize;
-        for (i, (&id, &z)) in buffer.face.iter().zip(&buffer.depth).enumerate() {
-            if id == VisibilityBuffer::NONE || z >= depth[i] {
-                continue;
-            }
-            depth[i] = z;
-            let Some(color) = color.as_deref_mut() else {
-                continue;
-            };
-            let f = faces[id as usize];
-            let corners = f.map(|k| vertices[k as usize]);
-            let w = barycentrics(&view, corners, (i % width) as f32, (i / width) as f32)
-                .unwrap_or([1.0, 0.0, 0.0]);
-            let mix = |a: V3, b: V3, c: V3| a * w[0] + b * w[1] + c * w[2];
-            let [n0, n1, n2] = f.map(|k| normals[k as usize]);
-            let [r0, r1, r2] = f.map(|k| self.rest.base[k as usize].coords);
-            let (n, rest) = (mix(n0, n1, n2), mix(r0, r1, r2));
-            let nearest = if w[0] >= w[1] && w[0] >= w[2] {
-                0
-            } else {
-                1 + usize::from(w[2] > w[1])
-            };
-            let base = self.paint.color(f[nearest], &P3::from(rest));
-            let n = n / n.norm().max(f32::EPSILON);
-            let [ambient, sky, key_share, fill_share] = settings.shade;
-            let shade = ambient
-                + sky * n.dot(&up)
-                + key_share * n.dot(&key).max(0.0)
-                + fill_share * n.dot(&fill).max(0.0);
-            for (c, b) in color[3 * i..3 * i + 3].iter_mut().zip(base) {
-                *c = (f32::from(b) * shade).min(255.0) as u8;
-            }
-        }
-    }
-
-    /// Darkens the floor under feet and body.
-    fn cast_shadow(&self, truth: &Truth, color: &mut [u8]) {
-        let skeleton = self.actor.template.skeleton();
-        let over = |name: &str| {
-            let p = self
-                .setting
-                .world_from_camera
-                .point(&truth.joints[skeleton.index(name).unwrap_or(0)]);
-            [p.x as f32, p.z as f32]
-        };
-        let LightSettings {
-            shadow,
-            shadow_depth,
-            ..
-        } = LightSettings::default();
-        let spots = [
-            (over("left_foot"), shadow[0], shadow_depth[0]),
-            (over("right_foot"), shadow[0], shadow_depth[0]),
-            (over("pelvis"), shadow[1], shadow_depth[1]),
-        ];
-        for &(i, at) in &self.background.floor {
-            let mut light = 1.0f32;
-            for (c, radius, strength) in spots {
-                let r2 = ((at[0] - c[0]).powi(2) + (at[1] - c[1]).powi(2)) / (radius * radius);
-                if r2 < 1.0 {
-                    light *= 1.0 - strength * (1.0 - r2) * (1.0 - r2);
-                }
-            }
-            if light < 1.0 {
-                for c in &mut color[3 * i as usize..3 * i as usize + 3] {
-                    *c = (f32::from(*c) * light) as u8;
-                }
-            }
+    fn body<'a>(&'a self, truth: &'a Truth) -> PaintedBody<'a> {
+        PaintedBody {
+            template: &self.actor.template,
+            rest: &self.rest,
+            paint: &self.paint,
+            joints: &truth.joints,
+            vertices: &truth.vertices,
         }
     }
 }

@@ -27,7 +27,7 @@ fn depth_equals_the_true_surface() {
     let k = s.setting().camera;
     for i in [0, 110, 260, 340, 550, 620] {
         let (frame, truth) = s.frame(i);
-        let empty = &s.background.depth;
+        let empty = s.view.empty_depth();
         let body = frame
             .depth
             .data()
@@ -131,4 +131,38 @@ fn a_rolled_camera_renders_the_same_world() {
             x.abs_diff(y) <= 2
         });
     assert!(same.count() > 300_000);
+}
+
+/// The colour camera's picture is the one that a camera at its place and time takes.
+#[test]
+fn separate_color_is_taken_from_its_own_place_and_time() {
+    let color_from_depth = Rigid::from_parts(
+        V3d::new(-0.05, 0.01, 0.004),
+        UnitQuaternion::from_euler_angles(0.03, -0.02, 0.01),
+    );
+    let camera = Intrinsics::KINECT_V1.resized(320, 240);
+    let moving = Setting {
+        routine: Routine::Walk,
+        ..Setting::default()
+    };
+    let two = Setting {
+        color_camera: Some(SeparateColor {
+            camera,
+            color_from_depth,
+            delay: 0.1,
+        }),
+        ..moving.clone()
+    };
+    let to_color = Rigid::new(*color_from_depth.inverse().iso());
+    let alone = Setting {
+        camera,
+        world_from_camera: moving.world_from_camera * to_color,
+        ..moving.clone()
+    };
+    let [two, one, alone] = [two, moving, alone].map(|s| Sequence::new(Actor::default(), s));
+    let (frame, _) = two.frame(60);
+    assert_eq!(frame.depth, one.frame(60).0.depth);
+    assert_eq!(frame.color, alone.frame(63).0.color);
+    assert_eq!(two.calibration().color, Some(camera));
+    assert_eq!(two.calibration().color_from_depth, color_from_depth);
 }

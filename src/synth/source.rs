@@ -10,6 +10,8 @@ pub struct SynthSource {
     sequence: Sequence,
     frames: Option<u64>,
     next: u64,
+    /// Calibration that the source states instead of the true one.
+    stated: Option<Calibration>,
 }
 
 impl SynthSource {
@@ -19,6 +21,15 @@ impl SynthSource {
             sequence,
             frames,
             next: 0,
+            stated: None,
+        }
+    }
+    /// The same frames with a calibration that need not be theirs: of a camera that does not know it.
+    #[must_use]
+    pub fn stating(self, calibration: Calibration) -> Self {
+        Self {
+            stated: Some(calibration),
+            ..self
         }
     }
     /// The sequence, with its ground truth.
@@ -29,7 +40,8 @@ impl SynthSource {
 
 impl RgbdSource for SynthSource {
     fn calibration(&self) -> &Calibration {
-        self.sequence.calibration()
+        let truth = self.sequence.calibration();
+        self.stated.as_ref().unwrap_or(truth)
     }
     fn len(&self) -> Option<usize> {
         self.frames.and_then(|n| usize::try_from(n).ok())

@@ -170,17 +170,18 @@ fn device(name: &str, camera: Option<&Path>) -> Result<OpenSource, SourceError> 
     })
 }
 
-/// `try-on` (the default), `leave`, `still`, `seated` or `empty`.
+/// `try-on` (the default), `leave`, `walk`, `still`, `seated` or `empty`.
 fn routine(clip: &str) -> Result<Routine, String> {
     Ok(match clip {
         "" | "try-on" => Routine::TryOn,
         "leave" => Routine::LeaveAndReturn,
+        "walk" => Routine::Walk,
         "still" => Routine::Still,
         "seated" => Routine::Hold(Posture::Sitting),
         "empty" => Routine::Empty,
         other => {
             return Err(format!(
-                "`{other}` is no routine; there are try-on, leave, still, seated and empty"
+                "`{other}` is no routine; there are try-on, leave, walk, still, seated and empty"
             ));
         }
     })

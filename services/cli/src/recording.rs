@@ -3,7 +3,9 @@
 use anyhow::{Context, Result};
 use clap::Args;
 use std::path::{Path, PathBuf};
-use tryon::formats::{FormatError, RecordingOptions, Reoriented, RgbdSource, open_recording_with};
+use tryon::formats::{
+    CameraFile, FormatError, RecordingOptions, Reoriented, RgbdSource, open_recording_with,
+};
 use tryon::geometry::camera::{Calibration, LensCalibration, Mounting, PictureTurn, RgbdFrame};
 use tryon_kit::config::Ros2Config;
 
@@ -108,6 +110,12 @@ impl RgbdSource for Told {
     }
     fn untaken(&self) -> &[String] {
         self.source.untaken()
+    }
+    fn camera_file(&self) -> CameraFile {
+        self.source.camera_file()
+    }
+    fn color_time_ns(&self) -> Option<u64> {
+        self.source.color_time_ns()
     }
     fn len(&self) -> Option<usize> {
         self.source.len()

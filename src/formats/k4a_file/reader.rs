@@ -65,7 +65,12 @@ impl K4aReader {
         let color_size = color.map(|c| c.size);
         let lenses = match (header.calibration.as_deref(), camera) {
             (Some(json), _) => lenses(path, json, depth.size, color_size)?,
-            (None, Some(camera)) => camera_lenses(path, camera, depth.size, color_size)?,
+            (None, Some(camera)) => {
+                let lenses = read_lenses(camera, &mut untaken)?;
+                let camera = (camera, &lenses);
+                check_sizes(path, camera, depth.size, color_size)?;
+                lenses
+            }
             (None, None) => {
                 let why = "missing: recorded without the device's calibration; pass `--camera camera.json`";
                 return Err(FormatError::field(path, "calibration.json", why));
@@ -153,15 +158,14 @@ impl K4aReader {
     }
 }
 
-/// Lenses of a `camera.json` whose cameras have the sizes of the tracks.
-fn camera_lenses(
+/// Checks that the lenses of a `camera.json` have the sizes of the tracks.
+fn check_sizes(
     path: &Path,
-    camera: &Path,
+    (camera, lenses): (&Path, &LensCalibration),
     depth: (u32, u32),
     color: Option<(u32, u32)>,
-) -> Result<LensCalibration, FormatError> {
-    let lenses = read_lenses(camera)?;
-    let calibration = pinholes(&lenses);
+) -> Result<(), FormatError> {
+    let calibration = pinholes(lenses);
     let color_camera = calibration.color.unwrap_or(calibration.depth);
     let tracks = [
         ("DEPTH", Some(depth), calibration.depth),
@@ -178,7 +182,7 @@ fn camera_lenses(
             return Err(FormatError::field(path, track, why));
         }
     }
-    Ok(lenses)
+    Ok(())
 }
 
 /// The track named DEPTH.

@@ -2,7 +2,7 @@
 //! and the same files damaged.
 
 use crate::recording::{open_as_recorded, open_as_recorded_with};
-use crate::{FormatError, RecordingOptions};
+use crate::{CameraFile, FormatError, RecordingOptions};
 use nalgebra::Vector3;
 use serde_json::Value;
 use std::fs;
@@ -109,6 +109,41 @@ fn transforms_place_the_color_camera() {
             off < 1e-12 && pose.rotation.angle() < 1e-7,
             "{name}: {pose}"
         );
+    }
+}
+
+/// The calibration of a recording, written to a file with another clock of colour and given back to it.
+#[test]
+fn a_written_camera_file_calibrates_the_recording_it_is_of() {
+    let dir = tempfile::tempdir().expect("temporary folder");
+    let json = dir.path().join("camera.json");
+    for name in ["ros1_lz4.bag", "ros2_mcap"] {
+        let mut plain = open_as_recorded(&recording(name)).expect("opens");
+        let file = CameraFile {
+            color_time_offset_s: 0.001,
+            ..plain.camera_file()
+        };
+        file.write(&json).expect("written");
+        let options = RecordingOptions {
+            camera: Some(json.clone()),
+            ..RecordingOptions::default()
+        };
+        let mut shifted = open_as_recorded_with(&recording(name), &options).expect("opens");
+        let (a, b) = (plain.next_frame(), shifted.next_frame());
+        assert_eq!(a.expect("reads"), b.expect("reads"), "{name}");
+        let [before, after] = [&plain, &shifted].map(|s| s.color_time_ns().expect("stamped"));
+        assert_eq!(after, before + 1_000_000, "{name}");
+
+        let got = shifted.camera_file();
+        let turn = got.lenses.color_from_depth.inverse() * file.lenses.color_from_depth;
+        assert!(turn.iso().rotation.angle() < 1e-9, "{name}");
+        let off = turn.iso().translation.vector.norm();
+        assert!(
+            off < 1e-12 && got.lenses.depth == file.lenses.depth,
+            "{name}"
+        );
+        assert_eq!(got.lenses.color, file.lenses.color, "{name}");
+        assert!((got.depth_scale - file.depth_scale).abs() < 1e-9, "{name}");
     }
 }
 

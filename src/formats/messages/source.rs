@@ -7,9 +7,8 @@ use super::pairing::NearestItem;
 use super::selection::{TopicWish, other_channels};
 use super::survey::Survey;
 use super::topic_images::{TimeBase, TimedImage, TopicImages};
-use crate::FormatError;
-use crate::rgbd_folder::read_camera;
 use crate::rgbd_source::{MAX_COLOR_GAP_NS, RgbdSource};
+use crate::{CameraFile, FormatError};
 use std::path::{Path, PathBuf};
 use tryon_geometry::camera::{Calibration, ColorImage, LensCalibration, RgbdFrame};
 
@@ -33,6 +32,8 @@ struct ChosenStreams {
     depth: String,
     color: Option<String>,
     times: TimeBase,
+    /// Time added to colour's stamps, nanoseconds.
+    color_offset_ns: i64,
 }
 
 impl ChosenStreams {
@@ -63,6 +64,7 @@ pub(crate) struct MessageSource {
     open: OpenContainer,
     streams: ChosenStreams,
     decoder: FrameDecoder,
+    camera: CameraFile,
     notes: Vec<String>,
     /// Notes of opening; those of reading follow.
     opening_notes: usize,
@@ -73,6 +75,8 @@ pub(crate) struct MessageSource {
     behind_ns: Option<u64>,
     color: Option<TopicImages>,
     nearest: NearestItem<TimedImage>,
+    /// Capture time of the last frame's colour, nanoseconds.
+    color_time_ns: Option<u64>,
     counts: FrameCounts,
 }
 
@@ -115,7 +119,7 @@ impl MessageSource {
         options: StreamOptions<'_>,
     ) -> Result<Self, FormatError> {
         let survey = Survey::read(path, &mut *open(path)?)?;
-        let (streams, decoder, notes) = match Self::choose(path, &survey, options) {
+        let (streams, camera, notes) = match Self::choose(path, &survey, options) {
             Ok(found) => found,
             // A message at fault is the likelier reason for what is missing.
             Err(e) => return Err(survey.fault.unwrap_or(e)),
@@ -126,13 +130,15 @@ impl MessageSource {
             open,
             depth,
             color,
-            decoder,
+            decoder: FrameDecoder::new(path, camera.lenses.clone(), camera.depth_scale.recip()),
+            camera,
             opening_notes: notes.len(),
             notes,
             streams,
             ahead: None,
             behind_ns: None,
             nearest: NearestItem::new(),
+            color_time_ns: None,
             counts: FrameCounts::default(),
         })
     }
@@ -142,7 +148,7 @@ impl MessageSource {
         path: &Path,
         survey: &Survey,
         options: StreamOptions<'_>,
-    ) -> Result<(ChosenStreams, FrameDecoder, Vec<String>), FormatError> {
+    ) -> Result<(ChosenStreams, CameraFile, Vec<String>), FormatError> {
         let named = |f: MessageFault| FormatError::field(path, f.field, f.why);
         let wish = TopicWish {
             depth: options.depth_topic,
@@ -150,19 +156,21 @@ impl MessageSource {
         };
         let mut selection = survey.select(wish).map_err(named)?;
         let mut notes = std::mem::take(&mut selection.notes);
-        let (lenses, depth_unit) = match options.camera {
+        let camera: CameraFile = match options.camera {
             Some(camera) => {
-                let (calibration, scale) = read_camera(camera)?;
                 if !survey.cameras.is_empty() {
                     let why = "not taken, --camera is";
                     notes.push(format!("cameras of the recording: {why}"));
                 }
-                (calibration.into(), scale.recip())
+                CameraFile::read(camera)?
             }
             None => {
                 let found = survey.calibrate(&selection).map_err(named)?;
                 notes.extend(found.notes);
-                (found.lenses, found.depth_unit)
+                CameraFile {
+                    depth_scale: found.depth_unit.recip(),
+                    ..found.lenses.into()
+                }
             }
         };
         let (depth, color) = (selection.depth, selection.color);
@@ -179,9 +187,9 @@ impl MessageSource {
             } else {
                 TimeBase::Log
             },
+            color_offset_ns: camera.color_time_offset_ns(),
         };
-        let decoder = FrameDecoder::new(path, lenses, depth_unit);
-        Ok((streams, decoder, notes))
+        Ok((streams, camera, notes))
     }
 
     /// The next depth image, and the time of the one after it.
@@ -212,15 +220,20 @@ impl MessageSource {
         let Some(stream) = &mut self.color else {
             return Ok(None);
         };
+        self.color_time_ns = None;
+        let offset = self.streams.color_offset_ns;
         let next = |_| match stream.next_image() {
-            Ok(image) => Ok(image.map(|i| (i.time_ns, i))),
+            Ok(image) => Ok(image.map(|i| (i.time_ns.saturating_add_signed(offset), i))),
             // The depth reader reports the same damage.
             Err(_) if stream.is_ended() => Ok(None),
             Err(e) => Err(e),
         };
         let neighbours = [self.behind_ns.replace(time_ns), next_ns];
-        let paired = self.nearest.pair(time_ns, neighbours, next)?;
-        paired.map(|image| self.decoder.color(image)).transpose()
+        let Some(paired) = self.nearest.pair(time_ns, neighbours, next)? else {
+            return Ok(None);
+        };
+        self.color_time_ns = Some(paired.time_ns.saturating_add_signed(offset));
+        self.decoder.color(paired).map(Some)
     }
 
     /// Notes topics that begin late, frames without colour, and a file that is cut short.
@@ -259,6 +272,12 @@ impl RgbdSource for MessageSource {
     }
     fn lenses(&self) -> LensCalibration {
         self.decoder.lenses()
+    }
+    fn camera_file(&self) -> CameraFile {
+        self.camera.clone()
+    }
+    fn color_time_ns(&self) -> Option<u64> {
+        self.color_time_ns
     }
     fn untaken(&self) -> &[String] {
         &self.notes

@@ -58,7 +58,7 @@ impl NpzReader {
                 untaken.push(format!("{}: the file has its own K", camera.display()));
                 Calibration::registered(k).into()
             }
-            (None, Some(camera)) => read_lenses(camera)?,
+            (None, Some(camera)) => read_lenses(camera, &mut untaken)?,
             (None, None) => {
                 let why = "missing: expected 3 × 3 numbers, or `--camera camera.json`";
                 return Err(fault("K", why.to_owned()));

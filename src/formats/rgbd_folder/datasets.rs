@@ -3,7 +3,7 @@
 //! TUM RGB-D benchmark ("Intrinsic camera calibration of the Kinect"; Sturm et al., IROS 2012) and the Bonn RGB-D dynamic
 //! dataset (Palazzolo et al., IROS 2019): 640 × 480, depth registered to colour, 5000 units per metre.
 
-use super::camera_json::CameraFile;
+use crate::CameraFile;
 use std::path::Path;
 use tryon_geometry::camera::{Distortion, Intrinsics, Lens, LensCalibration};
 use tryon_geometry::math::Rigid;
@@ -84,6 +84,7 @@ impl PublishedCamera {
                 color_from_depth: Rigid::identity(),
             },
             depth_scale: DEPTH_SCALE,
+            color_time_offset_s: 0.0,
         }
     }
 }

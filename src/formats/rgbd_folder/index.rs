@@ -1,6 +1,7 @@
 //! Files of each frame, by time lists or by name.
 
 use super::names::{nanoseconds, natural_order, stem};
+pub(super) use super::pairing::ColorEntry;
 use super::pairing::{ImageList, pair_colors};
 use crate::FormatError;
 use crate::image::read_limited;
@@ -21,7 +22,7 @@ pub(super) struct Entry {
     /// Depth image.
     pub(super) depth: String,
     /// Colour image of the same exposure.
-    pub(super) color: Option<String>,
+    pub(super) color: Option<ColorEntry>,
 }
 
 /// Frames of a folder.
@@ -34,8 +35,8 @@ pub(super) struct FolderIndex {
 }
 
 impl FolderIndex {
-    /// Lists the images of a folder and pairs them.
-    pub(super) fn read(folder: &Path) -> Result<Self, FormatError> {
+    /// Lists the images of a folder and pairs them; `color_offset_ns` is added to colour's times.
+    pub(super) fn read(folder: &Path, color_offset_ns: i64) -> Result<Self, FormatError> {
         let depth = images(folder, "depth", &["png"])?;
         if depth.images.is_empty() {
             return Err(FormatError::field(
@@ -45,7 +46,15 @@ impl FolderIndex {
             ));
         }
         let (mut colors, mut notes) = (vec![None; depth.images.len()], Vec::new());
-        if let Some((name, color)) = color_images(folder)? {
+        if let Some((name, mut color)) = color_images(folder)? {
+            let is_timed = depth.has_times && color.has_times;
+            if is_timed {
+                color.shift(color_offset_ns);
+            } else if color_offset_ns != 0 {
+                notes.push(format!(
+                    "{name}: no times; color_time_offset_s has no effect"
+                ));
+            }
             let (found, note) = pair_colors(&depth, &color);
             colors = found;
             notes.extend(note.map(|why| format!("{name}: {why}")));

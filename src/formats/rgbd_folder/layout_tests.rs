@@ -81,6 +81,32 @@ fn names_that_are_times_are_times() {
 }
 
 #[test]
+fn the_time_offset_of_colour_counts_in_pairing() {
+    let late = r#"1000, "color_time_offset_s": -0.016}"#;
+    let dir = folder(&CAMERA.replace("1000}", late));
+    depth(dir.path(), "1305031102.160407.png", 1);
+    depth(dir.path(), "1305031102.226738.png", 2);
+    for (i, time) in [".175304", ".211214", ".243211"].iter().enumerate() {
+        let name = format!("rgb/1305031102{time}.png");
+        color(dir.path(), &name, (4, 3), i as u8);
+    }
+    // Taken at .159304, .195214 and .227211.
+    assert_eq!(values(dir.path()), [(1, Some(0)), (2, Some(2))]);
+    let mut source = open_as_recorded(dir.path()).expect("opens");
+    assert!(source.color_time_ns().is_none() && source.untaken().is_empty());
+    source.next_frame().expect("reads");
+    assert_eq!(source.color_time_ns(), Some(1_305_031_102_159_304_000));
+
+    let dir = folder(&CAMERA.replace("1000}", late));
+    depth(dir.path(), "1.png", 1);
+    color(dir.path(), "rgb/1.png", (4, 3), 7);
+    let mut source = open_as_recorded(dir.path()).expect("opens");
+    assert!(source.untaken()[0].contains("color_time_offset_s has no effect"));
+    source.next_frame().expect("reads");
+    assert_eq!(source.color_time_ns(), None, "nothing states it");
+}
+
+#[test]
 fn colour_that_nothing_pairs_is_named() {
     let dir = folder(CAMERA);
     depth(dir.path(), "a.png", 1);

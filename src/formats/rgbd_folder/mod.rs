@@ -1,6 +1,5 @@
 //! RGBD folders: `camera.json`, `depth/*.png`, colour in `rgb/` or `color/`, and time lists as in the TUM RGB-D benchmark.
 
-mod camera_json;
 mod datasets;
 mod index;
 mod names;
@@ -9,7 +8,6 @@ mod reader;
 mod resume;
 mod writer;
 
-pub use camera_json::CameraFile;
 pub(crate) use reader::read_lenses;
 pub use reader::{RgbdFolder, depth_to_mm, read_camera};
 pub use writer::RgbdFolderWriter;

@@ -13,8 +13,35 @@ pub(super) struct ImageList {
     pub(super) has_times: bool,
 }
 
+impl ImageList {
+    /// Adds a time to all times; the order stays.
+    pub(super) fn shift(&mut self, offset_ns: i64) {
+        for (time, _) in &mut self.images {
+            *time = time.saturating_add_signed(offset_ns);
+        }
+    }
+}
+
+/// Colour image of a frame.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) struct ColorEntry {
+    /// Path relative to the folder.
+    pub(super) file: String,
+    /// Capture time on the clock of depth, nanoseconds, where both have times.
+    pub(super) time_ns: Option<u64>,
+}
+
+impl ColorEntry {
+    fn untimed(file: &str) -> Self {
+        Self {
+            file: file.to_owned(),
+            time_ns: None,
+        }
+    }
+}
+
 /// Colour of each depth image, and a note on colour that no frame has.
-pub(super) type PairedColors = (Vec<Option<String>>, Option<String>);
+pub(super) type PairedColors = (Vec<Option<ColorEntry>>, Option<String>);
 
 /// Pairs colour images with depth images.
 pub(super) fn pair_colors(depth: &ImageList, color: &ImageList) -> PairedColors {
@@ -38,15 +65,19 @@ pub(super) fn pair_colors(depth: &ImageList, color: &ImageList) -> PairedColors 
     (found, note)
 }
 
-fn by_time(depth: &ImageList, color: &ImageList) -> Vec<Option<String>> {
+fn by_time(depth: &ImageList, color: &ImageList) -> Vec<Option<ColorEntry>> {
     let times = depth.images.iter().map(|(time, _)| *time);
+    let entry = |(time, file): &(u64, String)| ColorEntry {
+        file: file.clone(),
+        time_ns: Some(*time),
+    };
     times
-        .map(|t| nearest(&color.images, t).map(str::to_owned))
+        .map(|t| nearest(&color.images, t).map(entry))
         .collect()
 }
 
 /// Image nearest in time, within [`MAX_COLOR_GAP_NS`].
-fn nearest(list: &[(u64, String)], time_ns: u64) -> Option<&str> {
+fn nearest(list: &[(u64, String)], time_ns: u64) -> Option<&(u64, String)> {
     let after = list.partition_point(|(t, _)| *t < time_ns);
     let candidates = [after.checked_sub(1), Some(after)];
     let gap = |i: &usize| list[*i].0.abs_diff(time_ns);
@@ -55,17 +86,21 @@ fn nearest(list: &[(u64, String)], time_ns: u64) -> Option<&str> {
         .flatten()
         .filter(|&i| i < list.len())
         .min_by_key(gap)?;
-    (gap(&best) <= MAX_COLOR_GAP_NS).then_some(list[best].1.as_str())
+    (gap(&best) <= MAX_COLOR_GAP_NS).then_some(&list[best])
 }
 
 /// Pairs of equal numbers; `None` if a name has none, two have the same, or none is in both lists.
-fn by_number(depth: &ImageList, color: &ImageList) -> Option<Vec<Option<String>>> {
+fn by_number(depth: &ImageList, color: &ImageList) -> Option<Vec<Option<ColorEntry>>> {
     let of_depth = numbered(depth)?;
     let of_color = numbered(color)?;
     if !of_color.keys().any(|n| of_depth.contains_key(n)) {
         return None;
     }
-    let color_of = |file: &str| of_color.get(&frame_number(file)?).map(|c| (*c).to_owned());
+    let color_of = |file: &str| {
+        of_color
+            .get(&frame_number(file)?)
+            .map(|c| ColorEntry::untimed(c))
+    };
     Some(
         depth
             .images
@@ -85,8 +120,11 @@ fn numbered(list: &ImageList) -> Option<BTreeMap<u64, &str>> {
 }
 
 /// Pairs in the lists' order, if they have the same length.
-fn by_position(depth: &ImageList, color: &ImageList) -> Option<Vec<Option<String>>> {
-    let files = color.images.iter().map(|(_, file)| Some(file.clone()));
+fn by_position(depth: &ImageList, color: &ImageList) -> Option<Vec<Option<ColorEntry>>> {
+    let files = color
+        .images
+        .iter()
+        .map(|(_, file)| Some(ColorEntry::untimed(file)));
     (depth.images.len() == color.images.len()).then(|| files.collect())
 }
 
@@ -100,10 +138,11 @@ mod tests {
             .iter()
             .map(|t| (t * 1_000_000, format!("{t}")))
             .collect();
-        assert_eq!(nearest(&list, 40_000_000), Some("33"));
-        assert_eq!(nearest(&list, 52_000_000), Some("66"));
-        assert_eq!(nearest(&list, 150_000_000), None);
-        assert_eq!(nearest(&list, 320_000_000), Some("300"));
+        let nearest_name = |t| nearest(&list, t).map(|(_, file)| file.as_str());
+        assert_eq!(nearest_name(40_000_000), Some("33"));
+        assert_eq!(nearest_name(52_000_000), Some("66"));
+        assert_eq!(nearest_name(150_000_000), None);
+        assert_eq!(nearest_name(320_000_000), Some("300"));
         assert_eq!(nearest(&[], 0), None);
     }
 
@@ -116,7 +155,8 @@ mod tests {
 
     fn paired(depth: &[&str], color: &[&str]) -> (Vec<String>, bool) {
         let (found, note) = pair_colors(&list(depth, true), &list(color, false));
-        let found = found.into_iter().map(Option::unwrap_or_default).collect();
+        let name = |c: Option<ColorEntry>| c.map(|c| c.file).unwrap_or_default();
+        let found = found.into_iter().map(name).collect();
         (found, note.is_some())
     }
 

@@ -1,9 +1,9 @@
 //! RGBD folders, read frame by frame.
 
-use super::camera_json::CameraFile;
 use super::datasets::camera_of;
-use super::index::{Entry, FolderIndex};
+use super::index::{ColorEntry, Entry, FolderIndex};
 use crate::FormatError;
+use crate::camera_json::CameraFile;
 use crate::image::{read_color, read_png_depth};
 use crate::pinholes::pinholes;
 use crate::rgbd_source::RgbdSource;
@@ -21,6 +21,8 @@ pub struct RgbdFolder {
     entries: Vec<Entry>,
     untaken: Vec<String>,
     next: usize,
+    /// Capture time of the last frame's colour.
+    color_time_ns: Option<u64>,
 }
 
 /// Calibration and depth scale (units per metre) of a `camera.json` without distortion (`tryon composite --camera`).
@@ -37,9 +39,18 @@ pub fn read_camera(path: &Path) -> Result<(Calibration, f64), FormatError> {
     Ok((pinholes(&file.lenses), file.depth_scale))
 }
 
-/// Lenses of a `camera.json`; the unit of depth is that of the recording beside it.
-pub(crate) fn read_lenses(path: &Path) -> Result<LensCalibration, FormatError> {
-    CameraFile::read(path).map(|c| c.lenses)
+/// Lenses of a `camera.json` for a recording of pairs in its own unit of depth; notes what has no effect on those.
+pub(crate) fn read_lenses(
+    path: &Path,
+    untaken: &mut Vec<String>,
+) -> Result<LensCalibration, FormatError> {
+    let file = CameraFile::read(path)?;
+    if file.color_time_offset_s != 0.0 {
+        let name = path.display();
+        let why = "has no effect: the recording holds pairs of depth and colour";
+        untaken.push(format!("{name}: color_time_offset_s {why}"));
+    }
+    Ok(file.lenses)
 }
 
 /// Converts depth in the file's unit to millimetres; values out of range become 0, "no reading".
@@ -84,7 +95,8 @@ impl RgbdFolder {
                 FormatError::field(&own, "file", why)
             })?,
         };
-        let FolderIndex { entries, mut notes } = FolderIndex::read(folder)?;
+        let FolderIndex { entries, mut notes } =
+            FolderIndex::read(folder, file.color_time_offset_ns())?;
         if let Some(camera) = camera.filter(|_| own.exists()) {
             notes.push(format!(
                 "{}: the folder has its own camera.json",
@@ -98,6 +110,7 @@ impl RgbdFolder {
             entries,
             untaken: notes,
             next: 0,
+            color_time_ns: None,
         };
         out.check_sizes()?;
         Ok(out)
@@ -114,7 +127,7 @@ impl RgbdFolder {
         };
         depth(first).or_else(|e| depth(last).map_err(|_| e))?;
         let color = |entry: Option<&Entry>| {
-            let Some(file) = entry.and_then(|e| e.color.as_ref()) else {
+            let Some(ColorEntry { file, .. }) = entry.and_then(|e| e.color.as_ref()) else {
                 return Ok(());
             };
             let path = self.folder.join(file);
@@ -148,7 +161,7 @@ impl RgbdFolder {
         depth_to_mm(&mut depth, self.camera.depth_scale);
         let color = match &entry.color {
             None => None,
-            Some(file) => {
+            Some(ColorEntry { file, .. }) => {
                 let path = self.folder.join(file);
                 let color = read_color(&path)?;
                 self.check_color(&path, &color)?;
@@ -187,8 +200,14 @@ impl RgbdSource for RgbdFolder {
     fn lenses(&self) -> LensCalibration {
         self.camera.lenses.clone()
     }
+    fn camera_file(&self) -> CameraFile {
+        self.camera.clone()
+    }
     fn untaken(&self) -> &[String] {
         &self.untaken
+    }
+    fn color_time_ns(&self) -> Option<u64> {
+        self.color_time_ns
     }
     fn len(&self) -> Option<usize> {
         Some(self.entries.len())
@@ -199,6 +218,7 @@ impl RgbdSource for RgbdFolder {
             return Ok(None);
         };
         self.next += 1;
+        self.color_time_ns = entry.color.as_ref().and_then(|c| c.time_ns);
         self.read_frame(entry, sequence as u64).map(Some)
     }
     fn skip_frame(&mut self) -> Result<bool, FormatError> {

@@ -118,6 +118,10 @@ fn bad_folders_name_file_and_field() {
         (camera("5", r#", "depth_scale": 0"#), "`depth_scale`"),
         (camera("5", r#", "color": {"width": 4}"#), "`color.height`"),
         (
+            camera("5", r#", "color_time_offset_s": 1.5"#),
+            "`color_time_offset_s`",
+        ),
+        (
             camera("5", r#", "color_from_depth": {"translation": [0, 0]}"#),
             "`color_from_depth.translation`",
         ),

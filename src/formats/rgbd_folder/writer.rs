@@ -1,12 +1,11 @@
 //! Writes an RGBD folder frame by frame.
 
-use super::camera_json::CameraFile;
 use crate::image::{encode_png_depth, encode_png_rgb};
-use crate::{FormatError, private_file};
+use crate::{CameraFile, FormatError, private_file};
 use std::fs::File;
 use std::io::Write;
 use std::path::{Path, PathBuf};
-use tryon_geometry::camera::{Calibration, RgbdFrame};
+use tryon_geometry::camera::{Calibration, LensCalibration, RgbdFrame};
 
 fn create(path: &Path) -> Result<File, FormatError> {
     private_file::create(path).map_err(|e| FormatError::io(path, e))
@@ -41,11 +40,7 @@ impl RgbdFolderWriter {
         }
         let depth = folder.join("depth");
         private_file::create_folders(&depth).map_err(|e| FormatError::io(&depth, e))?;
-        let file = CameraFile {
-            lenses: calibration.clone().into(),
-            depth_scale: 1000.0,
-        };
-        write(&camera, file.to_json().as_bytes())?;
+        CameraFile::from(LensCalibration::from(calibration.clone())).write(&camera)?;
         let list = folder.join("depth.txt");
         let depth_list = create(&list)?;
         Ok(Self {

@@ -1,9 +1,10 @@
 //! `camera.json`: `{width, height, fx, fy, cx, cy, depth_scale}` and, for a separate colour camera,
 //! `color: {width, height, fx, fy, cx, cy}` and `color_from_depth: {translation: [x, y, z], rotation: [x, y, z, w]}`.
-//! Either camera may have a `distortion`: coefficients in OpenCV's order.
+//! Either camera may have a `distortion`: coefficients in OpenCV's order. `color_time_offset_s` is added to colour's times.
 
-use crate::FormatError;
-use crate::image::read_limited;
+use super::FormatError;
+use super::image::read_limited;
+use super::private_file;
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 use serde_json::{Map, Value, json};
 use std::path::Path;
@@ -22,13 +23,29 @@ const UNIT_TOLERANCE: f64 = 1e-3;
 /// Fewest units in a metre that are a depth camera's, and most metres a unit: a decimetre.
 const COARSEST: f64 = 10.0;
 
-/// A `camera.json`: lenses and the unit of the depth images.
-#[derive(Clone, Debug)]
+/// Largest time offset of colour, seconds: more is a clock that was not set.
+const MAX_TIME_OFFSET: f64 = 1.0;
+
+/// Calibration of a recording or a camera: lenses, the unit of the depth images, and the clock of colour.
+#[derive(Clone, Debug, PartialEq)]
 pub struct CameraFile {
     /// Both cameras, distortion included.
     pub lenses: LensCalibration,
-    /// Units per metre.
+    /// Units of depth per metre.
     pub depth_scale: f64,
+    /// Time to add to colour's times for the clock of depth, seconds. Depth pairs with the colour nearest after that.
+    pub color_time_offset_s: f64,
+}
+
+impl From<LensCalibration> for CameraFile {
+    /// Depth in millimetres, one clock.
+    fn from(lenses: LensCalibration) -> Self {
+        Self {
+            lenses,
+            depth_scale: DEFAULT_SCALE,
+            color_time_offset_s: 0.0,
+        }
+    }
 }
 
 impl CameraFile {
@@ -60,11 +77,25 @@ impl CameraFile {
                 color_from_depth: color_from_depth(path, map)?,
             },
             depth_scale: depth_scale(path, map)?,
+            color_time_offset_s: time_offset(path, map)?,
         })
     }
 
+    /// Writes the file, for its owner to read.
+    ///
+    /// # Errors
+    /// When it cannot be written.
+    pub fn write(&self, path: &Path) -> Result<(), FormatError> {
+        private_file::write(path, self.to_json().as_bytes()).map_err(|e| FormatError::io(path, e))
+    }
+
+    /// Time to add to colour's times, nanoseconds.
+    pub(crate) fn color_time_offset_ns(&self) -> i64 {
+        (self.color_time_offset_s * 1e9).round() as i64
+    }
+
     /// Text of the file.
-    pub(super) fn to_json(&self) -> String {
+    fn to_json(&self) -> String {
         let mut root = lens_json(&self.lenses.depth);
         root["depth_scale"] = json!(self.depth_scale);
         if let Some(c) = &self.lenses.color {
@@ -75,6 +106,9 @@ impl CameraFile {
                 "translation": iso.translation.vector.as_slice(),
                 "rotation": [q.x, q.y, q.z, q.w],
             });
+        }
+        if self.color_time_offset_s != 0.0 {
+            root["color_time_offset_s"] = json!(self.color_time_offset_s);
         }
         format!("{root:#}\n")
     }
@@ -107,6 +141,19 @@ fn depth_scale(path: &Path, map: &Map<String, Value>) -> Result<f64, FormatError
     let why = format!(
         "{stated}, expected units per metre (1000 for millimetres) or metres per unit (0.001)"
     );
+    Err(FormatError::field(path, FIELD, why))
+}
+
+fn time_offset(path: &Path, map: &Map<String, Value>) -> Result<f64, FormatError> {
+    const FIELD: &str = "color_time_offset_s";
+    let stated = match map.get(FIELD) {
+        None | Some(Value::Null) => return Ok(0.0),
+        Some(v) => number(path, FIELD, v)?,
+    };
+    if stated.abs() <= MAX_TIME_OFFSET {
+        return Ok(stated);
+    }
+    let why = format!("{stated}, expected at most {MAX_TIME_OFFSET} s");
     Err(FormatError::field(path, FIELD, why))
 }
 
