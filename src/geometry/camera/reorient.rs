@@ -7,7 +7,7 @@ use super::{
 /// Side of the square tiles in which a picture is turned: a tile of colours and its source stay in the first cache.
 const TILE: usize = 32;
 
-/// Sets frames upright: a frame allocates nothing; an upright camera costs nothing. 1 ms for 640 × 480 depth and colour.
+/// Sets frames upright: a frame allocates nothing; an upright camera costs nothing.
 #[derive(Clone, Debug)]
 pub struct Reorienter {
     mounting: Mounting,
