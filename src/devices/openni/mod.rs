@@ -10,8 +10,13 @@ use super::packed::packed_rows;
 use super::{Device, DeviceError, DeviceOptions, Family, Stream};
 use ffi::{OniDevice, OniStream, Refusal, SENSOR_COLOR, SENSOR_DEPTH};
 use modes::{Known, all_modes, best_mode, understood};
+use std::time::Duration;
 use tryon_formats::CameraFile;
 use tryon_geometry::camera::{Calibration, Intrinsics, LensCalibration};
+
+/// Time from the stop of streams to their destruction: OpenNI's dummy driver does not wait for its threads, which see the
+/// stop at their next image, 33 ms later.
+const SETTLING: Duration = Duration::from_millis(150);
 
 /// Sensor of a stream.
 fn sensor(stream: Stream) -> std::ffi::c_int {
@@ -41,26 +46,31 @@ pub(super) fn list() -> Result<Vec<Device>, DeviceError> {
     Ok(ffi::list()?.into_iter().map(describe).collect())
 }
 
-/// Opens the camera with a serial number; one of no number, and OpenNI's own recordings, by their place.
+/// Opens the camera with a serial number, one that states none by its place.
 fn find(serial: Option<&str>) -> Result<(String, OniDevice), DeviceError> {
     let mut present = Vec::new();
     let mut devices = Vec::new();
     for info in ffi::list()? {
         let device = OniDevice::open(&info.uri);
         let own = device.as_ref().ok().and_then(OniDevice::serial);
-        present.push(own.unwrap_or(info.uri));
+        let own = own.unwrap_or(info.uri);
+        if serial == Some(own.as_str()) {
+            return Ok((own, device?));
+        }
+        present.push(own);
         devices.push(device);
     }
-    let chosen = match choose(Family::Openni, serial, &present) {
-        Ok(chosen) => chosen,
-        Err(absent) => {
-            let place = serial.ok_or_else(|| absent.clone())?;
+    match (serial, choose(Family::Openni, serial, &present)) {
+        (Some(place), Err(absent)) => {
             let device = OniDevice::open(place).map_err(|_| absent)?;
-            return Ok((place.to_owned(), device));
+            Ok((place.to_owned(), device))
         }
-    };
-    let at = present.iter().position(|p| *p == chosen).unwrap_or(0);
-    Ok((chosen, devices.swap_remove(at)?))
+        (None, Err(absent)) => Err(absent),
+        (_, Ok(only)) => {
+            let device = devices.pop().unwrap_or_else(|| OniDevice::open(&only));
+            Ok((only, device?))
+        }
+    }
 }
 
 /// Opens a camera by its serial number.
@@ -204,6 +214,14 @@ struct OpenniDriver {
     streams: Vec<OniStream>,
     formats: Formats,
     _device: OniDevice,
+}
+
+impl Drop for OpenniDriver {
+    fn drop(&mut self) {
+        self.streams.iter().for_each(OniStream::stop);
+        #[allow(clippy::disallowed_methods)] // on the camera's own thread
+        std::thread::sleep(SETTLING);
+    }
 }
 
 impl Driver for OpenniDriver {

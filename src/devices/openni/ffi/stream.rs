@@ -6,8 +6,6 @@ use std::time::Duration;
 
 /// `ONI_STATUS_TIME_OUT`.
 const TIME_OUT: c_int = 102;
-/// Time in which a driver's thread sees that its stream was stopped. OpenNI's dummy does not wait for its own.
-const SETTLING: Duration = Duration::from_millis(50);
 /// `ONI_STREAM_PROPERTY_HORIZONTAL_FOV`, `…_VERTICAL_FOV`, `…_VIDEO_MODE` and `…_MIRRORING`.
 const HORIZONTAL_FOV: c_int = 1;
 const VERTICAL_FOV: c_int = 2;
@@ -78,6 +76,12 @@ impl OniStream {
         Err(("oniStreamStart", refusal(&self.functions, status)))
     }
 
+    /// Stops the images. A stopped stream stays so.
+    pub(in super::super) fn stop(&self) {
+        // SAFETY: the stream exists.
+        unsafe { (self.functions.oniStreamStop)(self.handle) };
+    }
+
     /// Reads the image that waits: its time, and its rows without padding.
     fn read(&self) -> Result<Image, Refusal> {
         let mut frame: *mut OniFrame = std::ptr::null_mut();
@@ -111,11 +115,7 @@ impl OniStream {
 
 impl Drop for OniStream {
     fn drop(&mut self) {
-        // SAFETY: the stream exists, and nothing uses it any more. Stopping a stopped stream does nothing.
-        unsafe { (self.functions.oniStreamStop)(self.handle) };
-        #[allow(clippy::disallowed_methods)] // on the camera's own thread
-        std::thread::sleep(SETTLING);
-        // SAFETY: as above, and the driver's thread has ended.
+        // SAFETY: the stream exists, and nothing uses it any more.
         unsafe { (self.functions.oniStreamDestroy)(self.handle) };
     }
 }
