@@ -47,7 +47,6 @@ mod npz_recording;
 pub mod obj;
 mod obj_records;
 mod obj_scene;
-mod pinholes;
 mod position_codec;
 mod private_file;
 mod r3d_file;

@@ -7,7 +7,6 @@ use super::pairs::{FramePair, PairTiming, PendingFrames};
 use super::pixels::{ColorCodec, DepthCodec};
 use crate::FormatError;
 use crate::image::check_size;
-use crate::pinholes::pinholes;
 use crate::rgbd_folder::read_lenses;
 use crate::rgbd_source::RgbdSource;
 use std::fs::File;
@@ -89,7 +88,7 @@ impl K4aReader {
         Ok(Self {
             path: path.to_owned(),
             scanner: BlockScanner::new(path, file, &header)?,
-            calibration: pinholes(&lenses),
+            calibration: lenses.pinholes(),
             lenses,
             untaken,
             depth,
@@ -165,7 +164,7 @@ fn check_sizes(
     depth: (u32, u32),
     color: Option<(u32, u32)>,
 ) -> Result<(), FormatError> {
-    let calibration = pinholes(lenses);
+    let calibration = lenses.pinholes();
     let color_camera = calibration.color.unwrap_or(calibration.depth);
     let tracks = [
         ("DEPTH", Some(depth), calibration.depth),

@@ -21,11 +21,7 @@ impl FrameDecoder {
     pub(super) fn new(origin: &Path, lenses: LensCalibration, depth_unit: f64) -> Self {
         Self {
             origin: origin.to_owned(),
-            calibration: Calibration {
-                depth: lenses.depth.intrinsics,
-                color: lenses.color.map(|c| c.intrinsics),
-                color_from_depth: lenses.color_from_depth,
-            },
+            calibration: lenses.pinholes(),
             lenses,
             depth_unit,
         }

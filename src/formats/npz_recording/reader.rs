@@ -4,7 +4,6 @@ use super::array::{ArrayStream, NumberType};
 use crate::FormatError;
 use crate::depth_metres::metres_to_mm;
 use crate::image::check_size;
-use crate::pinholes::pinholes;
 use crate::rgbd_folder::read_lenses;
 use crate::rgbd_source::{NOMINAL_PERIOD_NS, RgbdSource};
 use crate::zip_entries::{ZipFileArchive, open_zip};
@@ -64,7 +63,7 @@ impl NpzReader {
                 return Err(fault("K", why.to_owned()));
             }
         };
-        let calibration = pinholes(&lenses);
+        let calibration = lenses.pinholes();
         let k = &calibration.depth;
         if (k.width, k.height) != (width, height) {
             let why = format!(

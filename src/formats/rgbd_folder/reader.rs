@@ -5,7 +5,6 @@ use super::index::{ColorEntry, Entry, FolderIndex};
 use crate::FormatError;
 use crate::camera_json::CameraFile;
 use crate::image::{read_color, read_png_depth};
-use crate::pinholes::pinholes;
 use crate::rgbd_source::RgbdSource;
 use std::path::{Path, PathBuf};
 use tryon_geometry::camera::{
@@ -36,7 +35,7 @@ pub fn read_camera(path: &Path) -> Result<(Calibration, f64), FormatError> {
         let why = "an image pair is read as a pinhole's: undistort it, and leave this out";
         return Err(FormatError::field(path, "distortion", why));
     }
-    Ok((pinholes(&file.lenses), file.depth_scale))
+    Ok((file.lenses.pinholes(), file.depth_scale))
 }
 
 /// Lenses of a `camera.json` for a recording of pairs in its own unit of depth; notes what has no effect on those.
@@ -105,7 +104,7 @@ impl RgbdFolder {
         }
         let out = Self {
             folder: folder.to_owned(),
-            calibration: pinholes(&file.lenses),
+            calibration: file.lenses.pinholes(),
             camera: file,
             entries,
             untaken: notes,

@@ -24,12 +24,7 @@ pub(super) struct PushSource {
 
 impl PushSource {
     pub(super) fn new(name: PathBuf, description: Description, newest: Arc<Newest>) -> Self {
-        let lenses = &description.lenses;
-        let calibration = Calibration {
-            depth: lenses.depth.intrinsics,
-            color: lenses.color.map(|c| c.intrinsics),
-            color_from_depth: lenses.color_from_depth,
-        };
+        let calibration = description.lenses.pinholes();
         Self {
             name,
             description,
