@@ -5,7 +5,7 @@
 //!
 //! # Ideas
 //!
-//! - Families [`mod@family`], cameras by serial number [`mod@device`], faults with their remedy [`mod@error`].
+//! - Names: families [`mod@family`], cameras by serial number [`mod@device`], faults with their remedy [`mod@error`].
 //! - Images to frames: drivers [`mod@driver`], a thread for each camera [`mod@pump`], pairs by time [`mod@pairing`], the
 //!   newest wins [`mod@newest`], [`mod@decode`].
 //! - Families: [`mod@freenect`], [`mod@openni`], [`mod@v4l2`]; shared libraries at run time [`mod@library`].
