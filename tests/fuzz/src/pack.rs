@@ -34,7 +34,7 @@ pub(crate) fn unpack_zip(archive: &[u8]) -> Option<Bundle> {
         let mut entry = archive.by_index(i).ok()?;
         let mut bytes = Vec::new();
         entry.read_to_end(&mut bytes).ok()?;
-        bundle = bundle.and(&entry.name().to_owned(), bytes);
+        bundle = bundle.and(entry.name(), bytes);
     }
     Some(bundle)
 }
