@@ -1,5 +1,6 @@
 //! Commands and flags of the command line.
 
+mod camera;
 mod clothcap;
 mod fine;
 mod identity;
@@ -7,6 +8,7 @@ mod offline;
 mod serve;
 mod token;
 
+pub(crate) use camera::{CameraArgs, CameraCalibrateArgs, CameraWhat};
 pub(crate) use clothcap::{
     ClothcapAlignArgs, ClothcapArgs, ClothcapCaptureArgs, ClothcapRetargetArgs,
     ClothcapSegmentArgs, ClothcapWhat, ScanArgs, ScanFrameArgs, Shard,
@@ -73,6 +75,8 @@ pub(crate) enum Command {
     Record(RecordArgs),
     /// Publish a recording as if it were a live camera.
     Replay(ReplayArgs),
+    /// Depth cameras: the pose of one's colour camera.
+    Camera(CameraArgs),
     /// Keys, tokens and enrolment codes: who may call the services.
     Token(TokenArgs),
     /// The authority by which a store's services know each other, and certificates of it.
@@ -254,7 +258,7 @@ pub(crate) struct ExportArgs {
 
 #[derive(Debug, Args)]
 pub(crate) struct RecordArgs {
-    /// Source of the frames: `synth` (or `synth:leave`, `synth:still`, `synth:seated`, `synth:empty`), a recording to convert, or
+    /// Source of the frames: `synth` (or `synth:leave`, `synth:walk`, `synth:still`, `synth:seated`, `synth:empty`), a recording to convert, or
     /// `bus:STORE/CAMERA`, a camera that runs now.
     #[arg(long, default_value = "synth", value_name = "SOURCE")]
     pub(crate) source: String,

@@ -73,6 +73,7 @@ fn main() -> ExitCode {
         Command::Export(a) => commands::export::run(&a),
         Command::Record(a) => commands::record::run(&a),
         Command::Replay(a) => commands::replay::run(&a),
+        Command::Camera(a) => commands::camera::run(&a),
         Command::Token(a) => commands::token::run(&a),
         Command::Identity(a) => commands::identity::run(&a),
         Command::Doctor(a) => commands::doctor::run(&a),

@@ -1,5 +1,6 @@
 //! Commands of the command line, one file each.
 
+pub(crate) mod camera;
 pub(crate) mod clothcap;
 pub(crate) mod composite;
 pub(crate) mod demo;
