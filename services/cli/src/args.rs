@@ -9,7 +9,8 @@ mod serve;
 mod token;
 
 pub(crate) use camera::{
-    CameraArgs, CameraCheckArgs, CameraListArgs, CameraSourceArgs, CameraViewArgs, CameraWhat,
+    CameraArgs, CameraCalibrateArgs, CameraCheckArgs, CameraListArgs, CameraSourceArgs,
+    CameraViewArgs, CameraWhat,
 };
 pub(crate) use clothcap::{
     ClothcapAlignArgs, ClothcapArgs, ClothcapCaptureArgs, ClothcapRetargetArgs,
@@ -78,7 +79,7 @@ pub(crate) enum Command {
     Record(RecordArgs),
     /// Publish a recording as if it were a live camera.
     Replay(ReplayArgs),
-    /// Cameras: which there are, what one delivers, whether its place suits.
+    /// Cameras: which there are, what one delivers, whether its place suits, where its colour camera is.
     Camera(CameraArgs),
     /// Keys, tokens and enrolment codes: who may call the services.
     Token(TokenArgs),
@@ -263,7 +264,7 @@ pub(crate) struct ExportArgs {
 
 #[derive(Debug, Args)]
 pub(crate) struct RecordArgs {
-    /// Source of the frames: `synth` (or `synth:leave`, `synth:still`, `synth:seated`, `synth:empty`), a recording to convert, or
+    /// Source of the frames: `synth` (or `synth:leave`, `synth:walk`, `synth:still`, `synth:seated`, `synth:empty`), a recording to convert, or
     /// `bus:STORE/CAMERA`, a camera that runs now.
     #[arg(long, default_value = "synth", value_name = "SOURCE")]
     pub(crate) source: String,

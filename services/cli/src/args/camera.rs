@@ -21,6 +21,11 @@ pub(crate) enum CameraWhat {
     ///
     /// Exit code 1 where something will fail.
     Check(CameraCheckArgs),
+    /// Estimate the pose and the time offset of the colour camera from a recording of somebody who walks before both.
+    ///
+    /// The lenses of both cameras are known, by the recording or by --camera, and the device stands still. Ten seconds: one
+    /// person, to both sides of the picture, near and far. Frames without colour are left out.
+    Calibrate(CameraCalibrateArgs),
 }
 
 /// Source of frames.
@@ -87,4 +92,16 @@ impl SensorKind {
             Self::TimeOfFlight => SensorModel::TimeOfFlight,
         }
     }
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct CameraCalibrateArgs {
+    /// A recording with depth and colour; its extrinsics, if it has any, are where the estimate starts.
+    #[arg(value_name = "REC")]
+    pub(crate) input: PathBuf,
+    #[command(flatten)]
+    pub(crate) recording: RecordingArgs,
+    /// Calibration to write, for --camera or as camera.json of a folder.
+    #[arg(long, value_name = "JSON")]
+    pub(crate) out: PathBuf,
 }

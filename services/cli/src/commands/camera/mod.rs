@@ -1,5 +1,6 @@
-//! `tryon camera`: the cameras of this machine, their pictures and their places.
+//! `tryon camera`: the cameras of this machine, their pictures, their places and their calibration.
 
+mod calibrate;
 mod check;
 mod frames;
 mod list;
@@ -12,11 +13,12 @@ use std::process::ExitCode;
 /// Runs the command.
 ///
 /// # Errors
-/// A source that cannot be opened or read, a file that cannot be written.
+/// A source that cannot be opened or read, a recording that does not determine a calibration, a file that cannot be written.
 pub(crate) fn run(args: &CameraArgs) -> Result<ExitCode> {
     match &args.what {
         CameraWhat::List(a) => list::run(a),
         CameraWhat::View(a) => view::run(a),
         CameraWhat::Check(a) => check::run(a),
+        CameraWhat::Calibrate(a) => calibrate::run(a),
     }
 }
