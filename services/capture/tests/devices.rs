@@ -1,7 +1,7 @@
 //! A camera that is plugged in: a Kinect v1 by libfreenect's own replay.
 
 mod common;
-#[path = "../../../src/devices/tests/common/mod.rs"]
+#[path = "../../devices/tests/common/mod.rs"]
 mod replay;
 
 use common::{Client, camera, hold, start};

@@ -1,7 +1,7 @@
 //! `tryon camera` from outside: its output, its pictures and its exit codes.
 #![allow(clippy::unwrap_used, missing_docs)]
 
-#[path = "../../../src/devices/tests/common/mod.rs"]
+#[path = "../../devices/tests/common/mod.rs"]
 mod replay;
 
 use serde_json::Value;

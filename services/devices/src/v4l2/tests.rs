@@ -15,7 +15,7 @@ const STANDS_IN: &str = "TRYON_TEST_STAND_IN";
 /// Compiles a file of `testdata/`.
 fn compile(name: &str, out: &Path, flags: &[&str]) {
     let source = Path::new(env!("CARGO_MANIFEST_DIR"))
-        .join("v4l2/testdata")
+        .join("src/v4l2/testdata")
         .join(name);
     let status = Command::new("cc")
         .args(flags)

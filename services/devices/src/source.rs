@@ -35,11 +35,7 @@ pub(crate) fn start(opened: Opened) -> Result<Box<dyn RgbdSource>, DeviceError> 
     let path = PathBuf::from(name);
     let source = DeviceSource {
         name: path.clone(),
-        calibration: Calibration {
-            depth: lenses.depth.intrinsics,
-            color: lenses.color.map(|c| c.intrinsics),
-            color_from_depth: lenses.color_from_depth,
-        },
+        calibration: lenses.pinholes(),
         lenses,
         formats,
         depth_scale,
