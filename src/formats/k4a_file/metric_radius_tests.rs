@@ -55,7 +55,7 @@ fn valid_pixels_are_those_of_the_sdk() {
         }
     };
     depth(
-        1.739_999_771_118_164_1,
+        1.739_999_771_118_164,
         (512, 512),
         &[
             (0, NONE, NONE, 0),
