@@ -90,7 +90,7 @@ pub(super) const FOLDER: Target = Target::new(
         vec![folder]
     },
 )
-.words("width height fx cx depth_scale color color_from_depth translation rotation ..")
+.words("width height fx cx depth_scale color color_from_depth color_time_offset_s translation rotation ..")
 .allow(1 << 20, 60_000);
 
 /// Reads the first frames of a recording; the count of their pixels.
