@@ -56,8 +56,8 @@ pub fn inspect_place(
     let down = pose.map_or(0.0, |p| p.down_deg.to_radians());
     let fit = person_fit(camera, height, down, person);
 
-    let views: Vec<RoomView> = (clouds.iter().zip(&floors))
-        .map(|(cloud, floor)| RoomView::new(cloud, floor.as_ref()))
+    let views: Vec<FloorDistances> = (clouds.iter().zip(&floors))
+        .map(|(cloud, floor)| FloorDistances::new(cloud, floor.as_ref()))
         .collect();
     let nearer = fit.map_or(0.0, |f| f.from);
     let turned = images.first().filter(|_| pose.is_none());
@@ -76,13 +76,13 @@ fn middle(values: impl Iterator<Item = f64>) -> Option<f64> {
 }
 
 /// Distances along the floor (m) of the cells of an image that show no floor, and of those in the middle half of its columns.
-struct RoomView {
+struct FloorDistances {
     all: Vec<f64>,
     middle: Vec<f64>,
     cells: usize,
 }
 
-impl RoomView {
+impl FloorDistances {
     fn new(cloud: &OrganisedCloud, floor: Option<&ScenePlane>) -> Self {
         let columns = cloud.size().0;
         let mut view = Self {
