@@ -1,6 +1,6 @@
 //! Source whose frames are set upright as they are read: of a camera that hangs turned, or delivers mirrored pictures.
 
-use super::FormatError;
+use super::{CameraFile, FormatError};
 use super::rgbd_source::RgbdSource;
 use std::path::{Path, PathBuf};
 use tryon_geometry::camera::{Calibration, LensCalibration, Mounting, Reorienter, RgbdFrame};
@@ -37,6 +37,15 @@ impl RgbdSource for Reoriented {
     fn lenses(&self) -> LensCalibration {
         self.reorienter.lenses().clone()
     }
+    fn camera_file(&self) -> CameraFile {
+        CameraFile {
+            lenses: self.lenses(),
+            ..self.source.camera_file()
+        }
+    }
+    fn color_time_ns(&self) -> Option<u64> {
+        self.source.color_time_ns()
+    }
     fn untaken(&self) -> &[String] {
         self.source.untaken()
     }
@@ -55,6 +64,9 @@ impl RgbdSource for Reoriented {
             )
         })?;
         Ok(Some(frame))
+    }
+    fn skip_frame(&mut self) -> Result<bool, FormatError> {
+        self.source.skip_frame()
     }
     fn rewind(&mut self) -> Result<(), FormatError> {
         self.source.rewind()

@@ -125,6 +125,9 @@ impl RgbdSource for Told {
         self.tell();
         frame
     }
+    fn skip_frame(&mut self) -> Result<bool, FormatError> {
+        self.source.skip_frame()
+    }
     fn rewind(&mut self) -> Result<(), FormatError> {
         self.source.rewind()
     }

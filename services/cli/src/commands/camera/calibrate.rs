@@ -1,15 +1,19 @@
 //! `tryon camera calibrate`: pose and time of a colour camera, from somebody who walks.
 
 use crate::args::CameraCalibrateArgs;
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, bail};
 use std::process::ExitCode;
 use tryon::calibration::{Extrinsics, ExtrinsicsSettings, calibrate};
+use tryon::geometry::camera::PictureTurn;
 
 /// Runs the command.
 ///
 /// # Errors
 /// A recording that does not determine the calibration, in words; a file that cannot be written.
 pub(crate) fn run(args: &CameraCalibrateArgs) -> Result<ExitCode> {
+    if args.recording.mirrored || args.recording.turned != PictureTurn::default() {
+        bail!("a camera is calibrated as it delivers its pictures: leave out --turned and --mirrored");
+    }
     let mut source = args.recording.open(&args.input)?;
     let found = calibrate(source.as_mut(), &ExtrinsicsSettings::default())
         .with_context(|| args.input.display().to_string())?;
