@@ -1,7 +1,7 @@
 //! Source whose frames are set upright as they are read: of a camera that hangs turned, or delivers mirrored pictures.
 
-use super::{CameraFile, FormatError};
 use super::rgbd_source::RgbdSource;
+use super::{CameraFile, FormatError};
 use std::path::{Path, PathBuf};
 use tryon_geometry::camera::{Calibration, LensCalibration, Mounting, Reorienter, RgbdFrame};
 

@@ -12,7 +12,9 @@ use tryon::geometry::camera::PictureTurn;
 /// A recording that does not determine the calibration, in words; a file that cannot be written.
 pub(crate) fn run(args: &CameraCalibrateArgs) -> Result<ExitCode> {
     if args.recording.mirrored || args.recording.turned != PictureTurn::default() {
-        bail!("a camera is calibrated as it delivers its pictures: leave out --turned and --mirrored");
+        bail!(
+            "a camera is calibrated as it delivers its pictures: leave out --turned and --mirrored"
+        );
     }
     let mut source = args.recording.open(&args.input)?;
     let found = calibrate(source.as_mut(), &ExtrinsicsSettings::default())
