@@ -274,7 +274,8 @@ mod tests {
     async fn a_silent_device_is_said_and_then_given_up() {
         let (info, _) = watch::channel(v1::CameraInfo::default());
         let mut silence = Silence::new(Liveness::Reopened);
-        (silence.frame(), silence.frame());
+        silence.frame();
+        silence.frame();
         assert_eq!(silence.within(&info, async { 7 }).await, Some(7));
         assert_eq!(info.borrow().state(), CameraState::Unspecified);
         assert_eq!(silence.within(&info, pending::<()>()).await, None);

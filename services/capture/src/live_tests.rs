@@ -1,4 +1,5 @@
 //! A device that vanishes, hangs and returns, under the task of its camera.
+#![allow(clippy::disallowed_methods)] // its driver waits on a thread of its own
 
 use crate::camera::{self, Command, Handle};
 use crate::live::Opening;

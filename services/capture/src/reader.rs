@@ -2,9 +2,10 @@
 
 use crate::consent::Leases;
 use crate::live::{DriverCalls, Liveness, Silence, say_back};
-use crate::pace::{ClockFault, Moment, Pace};
+use crate::pace::{ClockFault, Pace};
 use crate::recorder::Recorder;
 use crate::source::OpenSource;
+use std::convert::Infallible;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 use tokio::sync::watch;
@@ -132,8 +133,73 @@ impl Reader {
         })
     }
 
+    /// The source's next frame, or why it cannot be read; an error when the source is over.
+    async fn next(&mut self, silence: &Silence) -> Result<Result<RgbdFrame, String>, ReadEnd> {
+        let is_device = self.liveness == Liveness::Reopened;
+        match self.read(silence).await {
+            Some(Ok(Some(frame))) => Ok(Ok(frame)),
+            None => Err(ReadEnd::Lost),
+            Some(Ok(None)) if is_device => Err(ReadEnd::Lost),
+            Some(Ok(None)) => Err(self.end(CameraState::Ended, String::new())),
+            Some(Err(why)) if is_device && self.source.is_none() => {
+                tracing::error!(camera = self.config.name, %why, "a driver is lost");
+                Err(ReadEnd::Lost)
+            }
+            Some(Err(why)) => Ok(Err(why)),
+        }
+    }
+
+    /// Leaves out an unreadable frame; the end after too many of them in a row.
+    async fn leave_out(&mut self, why: String, faults: u32) -> Result<(), ReadEnd> {
+        tracing::warn!(camera = self.config.name, %why, "left out a frame");
+        metrics::counter!("tryon_capture_faults").increment(1);
+        let is_device = self.liveness == Liveness::Reopened;
+        if (faults == MAX_FAULTS && !is_device) || self.source.is_none() {
+            return Err(self.end(CameraState::Failed, why));
+        }
+        tokio::time::sleep(AFTER_FAULT).await;
+        Ok(())
+    }
+
+    /// Publishes an exposure if somebody may see it: the consent may have ended since it was read.
+    async fn publish(&mut self, publisher: &mut dyn FramePublisher, exposure: Arc<Exposure>) {
+        let Some(sealer) = self.leases.sealer() else {
+            return;
+        };
+        let (id, read) = (exposure.id, exposure.stages.clone());
+        let sending = Instant::now();
+        match publisher.send(exposure, sealer).await {
+            Ok(true) => self.flow.moves(),
+            Ok(false) => self.flow.waits(|| UNRECEIVED.into()),
+            Err(e) => {
+                tracing::warn!(camera = self.config.name, error = %e, "a frame did not get out");
+                self.flow.waits(|| format!("frames do not get out: {e}"));
+            }
+        }
+        let stages: Vec<_> = (read.into_iter())
+            .chain([stage("capture.publish", sending)])
+            .collect();
+        frame_trace::record("capture", &id, &stages);
+        metrics::counter!("tryon_capture_frames").increment(1);
+        self.info.send_if_modified(|i| {
+            i.frames += 1;
+            // The count alone wakes no receiver.
+            false
+        });
+    }
+
     /// Publishes frames until the source ends, fails or is lost.
-    pub(crate) async fn run(mut self, mut publisher: Box<dyn FramePublisher>) -> ReadEnd {
+    pub(crate) async fn run(mut self, publisher: Box<dyn FramePublisher>) -> ReadEnd {
+        match self.read_on(publisher).await {
+            Ok(never) => match never {},
+            Err(end) => end,
+        }
+    }
+
+    async fn read_on(
+        &mut self,
+        mut publisher: Box<dyn FramePublisher>,
+    ) -> Result<Infallible, ReadEnd> {
         let is_live = self.liveness != Liveness::Patient;
         let (mut pace, mut faults, mut sequence) = (Pace::new(is_live), 0, 0);
         let mut silence = Silence::new(self.liveness);
@@ -149,26 +215,11 @@ impl Reader {
                 silence.restart();
             }
             let start = Instant::now();
-            let Some(read) = self.read(&silence).await else {
-                return ReadEnd::Lost;
-            };
-            let is_device = self.liveness == Liveness::Reopened;
-            let frame = match read {
-                Ok(Some(f)) => f,
-                Ok(None) if is_device => return ReadEnd::Lost,
-                Ok(None) => return self.end(CameraState::Ended, String::new()),
-                Err(why) if is_device && self.source.is_none() => {
-                    tracing::error!(camera = self.config.name, %why, "a driver is lost");
-                    return ReadEnd::Lost;
-                }
+            let frame = match self.next(&silence).await? {
+                Ok(frame) => frame,
                 Err(why) => {
                     faults += 1;
-                    tracing::warn!(camera = self.config.name, %why, "left out a frame");
-                    metrics::counter!("tryon_capture_faults").increment(1);
-                    if (faults == MAX_FAULTS && !is_device) || self.source.is_none() {
-                        return self.end(CameraState::Failed, why);
-                    }
-                    tokio::time::sleep(AFTER_FAULT).await;
+                    self.leave_out(why, faults).await?;
                     continue;
                 }
             };
@@ -176,60 +227,36 @@ impl Reader {
             silence.frame();
             say_back(&self.info);
             let read = stage("capture.read", start);
-            let Moment {
-                time_ns,
-                due,
-                fault,
-            } = pace.next(frame.time_ns, &self.config);
-            if let Some(fault) = fault {
+            let moment = pace.next(frame.time_ns, &self.config);
+            if let Some(fault) = moment.fault {
                 self.clock_fault(fault);
             }
-            if let Some(due) = due {
+            if let Some(due) = moment.due {
                 tokio::time::sleep_until(due).await;
             }
             let received_unix_ns = unix_ns();
             let id = v1::FrameId {
                 epoch: self.epoch,
                 sequence,
-                capture_time_ns: time_ns,
+                capture_time_ns: moment.time_ns,
                 received_unix_ns,
                 trace: sampler.trace(received_unix_ns),
             };
             sequence += 1;
-            let rgbd = RgbdFrame {
-                sequence: id.sequence,
-                time_ns,
-                ..frame
-            };
             let exposure = Arc::new(Exposure {
                 id,
                 calibration: self.calibration.clone(),
-                rgbd,
-                stages: vec![read.clone()],
+                rgbd: RgbdFrame {
+                    sequence: id.sequence,
+                    time_ns: id.capture_time_ns,
+                    ..frame
+                },
+                stages: vec![read],
             });
             if !self.recorder.offer(&exposure) {
                 self.recording_failed();
             }
-            // The consent may have ended since the frame was read.
-            let Some(sealer) = self.leases.sealer() else {
-                continue;
-            };
-            let sending = Instant::now();
-            match publisher.send(exposure, sealer).await {
-                Ok(true) => self.flow.moves(),
-                Ok(false) => self.flow.waits(|| UNRECEIVED.into()),
-                Err(e) => {
-                    tracing::warn!(camera = self.config.name, error = %e, "a frame did not get out");
-                    self.flow.waits(|| format!("frames do not get out: {e}"));
-                }
-            }
-            frame_trace::record("capture", &id, &[read, stage("capture.publish", sending)]);
-            metrics::counter!("tryon_capture_frames").increment(1);
-            self.info.send_if_modified(|i| {
-                i.frames += 1;
-                // The count alone wakes no receiver.
-                false
-            });
+            self.publish(&mut *publisher, exposure).await;
         }
     }
 }
