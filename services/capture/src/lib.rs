@@ -29,6 +29,7 @@ mod service;
 mod source;
 
 pub use check::{check, check_process};
+pub use push::PUSH;
 pub use source::{OpenSource, SourceError, is_live, is_recording, open, open_with};
 
 use std::sync::Arc;

@@ -11,7 +11,7 @@ use tokio_util::sync::CancellationToken;
 use tryon_kit::auth::{Connection, Credentials, Issuer};
 use tryon_kit::client::{channel, pauses};
 use tryon_kit::compute::Pool;
-use tryon_kit::config::Config;
+use tryon_kit::config::{CameraConfig, Config};
 use tryon_kit::flow::Stalls;
 use tryon_kit::frame_trace;
 use tryon_kit::frames::{FrameBus, LocalBus};
@@ -53,12 +53,24 @@ pub(crate) struct OneBox {
     /// Token of the mirror's page. It and its key are drawn at each start; where `[auth] keys` are given, their holder
     /// issues the page's token.
     pub(crate) token: Option<String>,
+    /// Token of the program that feeds a camera, by the camera's name; under the same keys.
+    pub(crate) feeders: Vec<(String, String)>,
     /// `http` or `https`.
     scheme: &'static str,
     tls: Tls,
     shutdown: CancellationToken,
     tasks: JoinSet<()>,
     traces: Option<frame_trace::Exporter>,
+}
+
+/// Tokens of the programs that feed cameras.
+fn feeder_tokens(config: &Config, issuer: &Issuer) -> Result<Vec<(String, String)>> {
+    let fed = (config.capture.cameras.iter()).filter(|c| c.source == tryon_capture_service::PUSH);
+    let token = |c: &CameraConfig| {
+        let token = issuer.issue_for_feeder(config.store(), &c.name)?;
+        Ok((c.name.clone(), token))
+    };
+    fed.map(token).collect()
 }
 
 impl OneBox {
@@ -87,6 +99,11 @@ impl OneBox {
             Some(issuer.issue_for_process(config.store(), &["compositor"])?)
         } else {
             None
+        };
+        let feeders = if token.is_some() {
+            feeder_tokens(&config, &issuer)?
+        } else {
+            Vec::new()
         };
         let pool = Pool::new(config.process.compute_threads)
             .context("the compute threads cannot be started")?;
@@ -130,6 +147,7 @@ impl OneBox {
             tls: files.tls,
             addresses,
             token,
+            feeders,
             shutdown,
             tasks,
             traces,

@@ -17,7 +17,7 @@ use tryon_proto::v1::{
 };
 
 /// Source of a camera that a program feeds.
-const PUSH: &str = "push";
+pub const PUSH: &str = "push";
 /// Answers that wait for a sender to read them.
 const MAX_ANSWERS: usize = 64;
 

@@ -6,5 +6,6 @@ mod newest;
 mod offset;
 mod source;
 
+pub use feed::PUSH;
 pub(crate) use feed::{Feed, first, is_push, open};
 pub(crate) use newest::Newest;

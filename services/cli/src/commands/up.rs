@@ -77,6 +77,9 @@ async fn serve(config: Config) -> Result<()> {
     for (name, grpc, admin) in &services.addresses {
         say(format_args!("{name}: grpc {grpc} admin {admin}"));
     }
+    for (camera, token) in &services.feeders {
+        say(format_args!("camera {camera}: fed with token {token}"));
+    }
     if let Some(page) = services.page() {
         say(format_args!("mirror: {page}"));
     }

@@ -79,7 +79,25 @@ impl Issuer {
     /// # Errors
     /// When the system has no random bytes.
     pub fn issue_for_process(&self, store: &str, services: &[&str]) -> Result<String, KeyFault> {
+        let claims = Self::claims_of_process(store, services)?;
+        self.issue(&claims).map_err(|_| KeyFault::Pem("store"))
+    }
+
+    /// A token for the program that feeds a camera, as [`Self::issue_for_process`].
+    ///
+    /// # Errors
+    /// When the system has no random bytes.
+    pub fn issue_for_feeder(&self, store: &str, camera: &str) -> Result<String, KeyFault> {
         let claims = Claims {
+            camera: Some(camera.into()),
+            methods: vec!["PublishFrames".into()],
+            ..Self::claims_of_process(store, &["capture"])?
+        };
+        self.issue(&claims).map_err(|_| KeyFault::Pem("store"))
+    }
+
+    fn claims_of_process(store: &str, services: &[&str]) -> Result<Claims, KeyFault> {
+        Ok(Claims {
             aud: services.iter().map(|s| (*s).into()).collect(),
             exp: unix_s() + PROCESS_LIFE_S,
             nbf: None,
@@ -88,8 +106,7 @@ impl Issuer {
             camera: None,
             session: None,
             methods: vec!["*".into()],
-        };
-        self.issue(&claims).map_err(|_| KeyFault::Pem("store"))
+        })
     }
 
     /// Credentials of the services of a box, which share this issuer's process.
