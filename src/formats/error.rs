@@ -41,4 +41,8 @@ impl FormatError {
             why: why.into(),
         }
     }
+    /// A frame of `file` that cannot be converted.
+    pub(crate) fn frame(file: &Path, sequence: u64, why: impl std::fmt::Display) -> Self {
+        Self::field(file, format!("frame {sequence}"), why.to_string())
+    }
 }

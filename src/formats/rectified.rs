@@ -47,13 +47,8 @@ impl RgbdSource for Rectified {
         let Some(mut frame) = self.source.next_frame()? else {
             return Ok(None);
         };
-        self.rectifier.rectify(&mut frame).map_err(|e| {
-            FormatError::field(
-                &self.path,
-                format!("frame {}", frame.sequence),
-                e.to_string(),
-            )
-        })?;
+        let converted = self.rectifier.rectify(&mut frame);
+        converted.map_err(|e| FormatError::frame(&self.path, frame.sequence, e))?;
         Ok(Some(frame))
     }
     fn skip_frame(&mut self) -> Result<bool, FormatError> {

@@ -56,13 +56,8 @@ impl RgbdSource for Reoriented {
         let Some(mut frame) = self.source.next_frame()? else {
             return Ok(None);
         };
-        self.reorienter.reorient(&mut frame).map_err(|e| {
-            FormatError::field(
-                &self.path,
-                format!("frame {}", frame.sequence),
-                e.to_string(),
-            )
-        })?;
+        let converted = self.reorienter.reorient(&mut frame);
+        converted.map_err(|e| FormatError::frame(&self.path, frame.sequence, e))?;
         Ok(Some(frame))
     }
     fn skip_frame(&mut self) -> Result<bool, FormatError> {

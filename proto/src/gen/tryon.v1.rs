@@ -843,8 +843,9 @@ pub mod capture_service_client {
                 .insert(GrpcMethod::new("tryon.v1.CaptureService", "HoldConsent"));
             self.inner.unary(req, path, codec).await
         }
-        /// Runs the camera under a new epoch; frames are published while a lease of consent runs. FAILED_PRECONDITION when it already runs, UNAVAILABLE when a
-        /// recording cannot be opened. A device is opened after the answer: until it is there, its state is LOST.
+        /// Runs the camera under a new epoch; frames are published while a lease of consent runs. FAILED_PRECONDITION when it
+        /// already runs, UNAVAILABLE when a recording cannot be opened. A device is opened after the answer: until it is there,
+        /// its state is LOST.
         pub async fn start_camera(
             &mut self,
             request: impl tonic::IntoRequest<super::StartCameraRequest>,
@@ -1024,8 +1025,9 @@ pub mod capture_service_server {
             tonic::Response<super::HoldConsentResponse>,
             tonic::Status,
         >;
-        /// Runs the camera under a new epoch; frames are published while a lease of consent runs. FAILED_PRECONDITION when it already runs, UNAVAILABLE when a
-        /// recording cannot be opened. A device is opened after the answer: until it is there, its state is LOST.
+        /// Runs the camera under a new epoch; frames are published while a lease of consent runs. FAILED_PRECONDITION when it
+        /// already runs, UNAVAILABLE when a recording cannot be opened. A device is opened after the answer: until it is there,
+        /// its state is LOST.
         async fn start_camera(
             &self,
             request: tonic::Request<super::StartCameraRequest>,
