@@ -1,55 +1,47 @@
 //! Captured depth from the picture's camera.
 
 use super::area::Area;
-use super::input::Input;
+use super::input::{Input, RenderError};
 use super::viewport::Viewport;
 use std::borrow::Cow;
-use tryon_geometry::math::{P3, V3};
+use tryon_geometry::camera::{Calibration, DepthImage, Registration};
 
-/// Margin around half a reading's footprint, target pixels: closes gaps between readings that rounding leaves.
-const FOOTPRINT_MARGIN: f32 = 0.25;
+/// Captured depth drawn into the picture's camera; the table of rays is kept until a camera changes.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct PictureDepth {
+    registration: Option<(Calibration, Registration)>,
+}
 
-/// Depth from the picture's camera, millimetres, shape `viewport.depth`: the sensor's own, or resampled when the colour
-/// camera stands elsewhere. A reading covers the pixels of its own footprint; the nearest wins.
-pub(crate) fn depth_from_picture<'a>(input: &Input<'a>, viewport: &Viewport) -> Cow<'a, [u16]> {
-    let Some(color) = &input.calibration.color else {
-        return Cow::Borrowed(input.frame.depth.data());
-    };
-    let target = viewport.depth_camera(color);
-    let [width, height] = viewport.depth;
-    let mut out = vec![0; width as usize * height as usize];
-    let depth = &input.frame.depth;
-    let source = input
-        .calibration
-        .depth
-        .resized(depth.width(), depth.height());
-    let iso: nalgebra::Isometry3<f32> = input.calibration.color_from_depth.iso().cast();
-    let rotation = iso.rotation.to_rotation_matrix().into_inner();
-    let shift: V3 = iso.translation.vector;
-    let reach =
-        (0.5 * (target.fx / source.fx).max(target.fy / source.fy)) as f32 + FOOTPRINT_MARGIN;
-    let range = |x: f32, side: u32| {
-        let lo = (x - reach).ceil().max(0.0) as u32;
-        lo..((x + reach).floor() + 1.0).clamp(0.0, side as f32) as u32
-    };
-    for (i, mm) in depth.data().iter().enumerate().filter(|(_, mm)| **mm != 0) {
-        let (u, v) = (i as u32 % depth.width(), i as u32 / depth.width());
-        let ray = source.unproject(u as f32, v as f32, f32::from(*mm) * 1e-3);
-        let p = P3::from(rotation * ray.coords + shift);
-        if p.z <= 0.0 {
-            continue;
-        }
-        let q = target.project(&p);
-        let mm = (p.z * 1e3).clamp(1.0, f32::from(u16::MAX)) as u16;
-        for y in range(q.y, height) {
-            for slot in range(q.x, width).map(|x| (y * width + x) as usize) {
-                if out[slot] == 0 || mm < out[slot] {
-                    out[slot] = mm;
-                }
-            }
-        }
+impl PictureDepth {
+    /// Depth from the picture's camera, millimetres, shape `viewport.depth`: the sensor's own, or registered when the colour
+    /// camera stands elsewhere.
+    pub(crate) fn take<'a>(
+        &mut self,
+        input: &Input<'a>,
+        viewport: &Viewport,
+    ) -> Result<Cow<'a, DepthImage>, RenderError> {
+        let depth = &input.frame.depth;
+        let Some(color) = &input.calibration.color else {
+            return Ok(Cow::Borrowed(depth));
+        };
+        let cameras = Calibration {
+            depth: (input.calibration.depth).resized(depth.width(), depth.height()),
+            color: Some(viewport.depth_camera(color)),
+            color_from_depth: input.calibration.color_from_depth,
+        };
+        let mut image = DepthImage::default();
+        (self.registration(cameras)).depth_in_color(depth, &mut image)?;
+        Ok(Cow::Owned(image))
     }
-    Cow::Owned(out)
+
+    fn registration(&mut self, cameras: Calibration) -> &mut Registration {
+        let kept = (self.registration.take()).filter(|(of, _)| *of == cameras);
+        let build = || {
+            let registration = Registration::new(cameras.clone());
+            (cameras, registration)
+        };
+        &mut self.registration.insert(kept.unwrap_or_else(build)).1
+    }
 }
 
 /// Captured depth by pixel of the drawn area.
@@ -119,9 +111,11 @@ mod tests {
         };
         let viewport = Viewport::new(&input, Framing::Cover);
         assert_eq!(viewport.depth, [160, 120]);
-        let resampled = depth_from_picture(&input, &viewport);
+        let resampled = PictureDepth::default()
+            .take(&input, &viewport)
+            .expect("registered");
         // 5 cm at 2 m are 3.3 of these pixels: the wall moves right, no gaps inside.
-        let row = &resampled[60 * 160..61 * 160];
+        let row = &resampled.data()[60 * 160..61 * 160];
         assert!(
             row[..2].iter().all(|d| *d == 0) && row[5..].iter().all(|d| *d == 2000),
             "{row:?}"

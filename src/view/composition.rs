@@ -2,7 +2,7 @@
 
 use super::area::Area;
 use super::captured::{brightness, captured};
-use super::captured_depth::{AreaDepth, depth_from_picture};
+use super::captured_depth::AreaDepth;
 use super::config::Model;
 use super::coverage::remove_biases;
 use super::evidence::{Evidence, PixelDepths};
@@ -18,7 +18,7 @@ use super::viewport::Viewport;
 use super::workspace::Workspace;
 use std::borrow::Cow;
 use std::time::Instant;
-use tryon_geometry::camera::ColorImage;
+use tryon_geometry::camera::{ColorImage, DepthImage};
 use tryon_geometry::par;
 
 /// Side of the tiles that are counted as drawn or skipped, pixels.
@@ -38,8 +38,8 @@ pub(crate) struct Composition<'a> {
     shadow_reach: f32,
     /// Samples along each side of a pixel.
     pub(crate) samples: u32,
-    /// Captured depth from the picture's camera, millimetres.
-    depth: Cow<'a, [u16]>,
+    /// Captured depth from the picture's camera.
+    depth: Cow<'a, DepthImage>,
     clock: Instant,
 }
 
@@ -59,7 +59,7 @@ impl<'a> Composition<'a> {
         let viewport = Viewport::new(input, config.framing);
         let mut composition = Self {
             image: captured(config.par, input, &viewport),
-            depth: depth_from_picture(input, &viewport),
+            depth: work.picture_depth.take(input, &viewport)?,
             report: RenderReport {
                 brightness: brightness(input, &config.exposure),
                 ..RenderReport::default()
@@ -98,7 +98,7 @@ impl<'a> Composition<'a> {
         let config = &model.config;
         remove_biases(config, &work.surface, &mut work.pixels);
         let is_tracked = (work.body).rasterise(config.par, input, &self.viewport, area);
-        let depth = AreaDepth::new(&self.viewport, area, &self.depth);
+        let depth = AreaDepth::new(&self.viewport, area, self.depth.data());
         collect_evidence(model, work, area, &depth, is_tracked);
         self.lap("evidence");
         if is_tracked {
@@ -174,7 +174,7 @@ impl<'a> Composition<'a> {
             view: CapturedPixels {
                 viewport: &self.viewport,
                 image: &self.image,
-                depth: &self.depth,
+                depth: self.depth.data(),
             },
             body: PosedLimbs {
                 limbs: body.limbs,

@@ -2,7 +2,7 @@
 
 use super::appearance::Appearance;
 use super::limbs::Limbs;
-use tryon_geometry::camera::{Calibration, RgbdFrame};
+use tryon_geometry::camera::{Calibration, FrameSizeError, RgbdFrame};
 use tryon_geometry::math::{P3, V3};
 use tryon_geometry::mesh::Face;
 
@@ -88,6 +88,9 @@ pub enum RenderError {
         /// Rows.
         height: u32,
     },
+    /// An image that has not the size of its camera.
+    #[error(transparent)]
+    FrameSize(#[from] FrameSizeError),
     /// The graphics card failed.
     #[error("graphics: {0}")]
     Graphics(String),

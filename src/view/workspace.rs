@@ -1,6 +1,7 @@
 //! Scratch of a renderer.
 
 use super::body_depth::BodyDepth;
+use super::captured_depth::PictureDepth;
 use super::contact_shadow::ContactShadows;
 use super::coverage::PixelCoverage;
 use super::hand::HandDetector;
@@ -10,6 +11,7 @@ use super::surface::Surface;
 /// Scratch of [`render`](super::render()); dropping it changes no picture.
 #[derive(Clone, Debug, Default)]
 pub struct Workspace {
+    pub(super) picture_depth: PictureDepth,
     pub(crate) surface: Surface,
     /// Coverage of each pixel of the drawn area.
     pub(crate) pixels: Vec<PixelCoverage>,
