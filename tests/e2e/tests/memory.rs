@@ -27,10 +27,9 @@ const EVERY: usize = 10;
 /// Sessions after the first count: few enough that one body that stays shows (25 kB of each). The variable asks for more.
 const COUNTED: usize = 20;
 const SESSIONS: &str = "TRYON_SESSIONS";
-/// Most bytes of a session that stay. One body is 0.5 MB, one outfit 3 MB. Over 180 sessions 0.9 kB of each stay, in nodes
-/// of epochs, of which a thread holds 64 at the most (docs/decisions/074); 3.3 kB over 30 on a busy machine, where samples of
-/// metrics and nodes of more threads wait.
-const MOST_KEPT: f64 = 8e3;
+/// Most bytes of a session that stay. One body is 0.5 MB, one outfit 3 MB. The first 40 sessions fill nodes of epochs, of
+/// which a thread holds 64 at the most (docs/decisions/074): 8.4 kB of each of the first 20 counted, 1.1 kB of each after 40.
+const MOST_KEPT: f64 = 16e3;
 
 /// Bytes of this process.
 struct Memory {
