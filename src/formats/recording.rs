@@ -32,14 +32,14 @@ impl RecordingOptions {
 }
 
 /// Extensions of the files that [`open_recording`] reads.
-pub const RECORDING_EXTENSIONS: [&str; 6] = ["mcap", "bag", "db3", "mkv", "npz", "r3d"];
+pub const RECORDING_EXTENSIONS: [&str; 7] = ["mcap", "bag", "db3", "mkv", "npz", "r3d", "png"];
 
 /// Way around OpenNI's recordings, whose depth is in codecs of their own.
 const NO_ONI: &str = "OpenNI's .oni is not read: play it with OpenNI 2 (in Python, openni2.Device.open_file), save its \
     frames as depth/N.png (16-bit millimetres) and rgb/N.png beside a camera.json, and pass that folder";
 
 /// Opens a recording: an RGBD folder, a rosbag2 folder, or a file ending in `.mcap`, `.bag`, `.db3`, `.mkv` (Azure
-/// Kinect), `.npz` or `.r3d` (Record3D).
+/// Kinect), `.npz`, `.r3d` (Record3D) or `.png` (one depth image).
 ///
 /// # Errors
 /// No such file or folder, none of these, or an unusable calibration.
@@ -93,6 +93,7 @@ pub(crate) fn open_as_recorded_with(
         Some("mkv") => Ok(Box::new(K4aReader::open_with(path, camera)?)),
         Some("npz") => Ok(Box::new(NpzReader::open(path, camera)?)),
         Some("r3d") => Ok(Box::new(R3dReader::open_with(path, camera)?)),
+        Some("png") => Ok(Box::new(RgbdFolder::open_pair(path, camera)?)),
         Some("oni") => Err(FormatError::field(path, "recording", NO_ONI)),
         _ => {
             let known = RECORDING_EXTENSIONS.map(|e| format!(".{e}")).join(", ");

@@ -91,7 +91,8 @@ pub(crate) enum Command {
 
 #[derive(Debug, Args)]
 pub(crate) struct RunArgs {
-    /// A recording: an RGBD folder, .mcap, .bag, .db3 or a rosbag2 folder, Azure Kinect's .mkv, Record3D's .r3d, or .npz.
+    /// A recording: an RGBD folder, .mcap, .bag, .db3 or a rosbag2 folder, Azure Kinect's .mkv, Record3D's .r3d, .npz,
+    /// or one depth image (.png) with its colour beside it (depth_1.png: color_1.png, rgb_1.png or .jpg).
     #[arg(long, value_name = "REC")]
     pub(crate) input: PathBuf,
     #[command(flatten)]
@@ -152,7 +153,8 @@ impl RunArgs {
 
 #[derive(Debug, Args)]
 pub(crate) struct TrackArgs {
-    /// A recording: an RGBD folder, .mcap, .bag, .db3 or a rosbag2 folder, Azure Kinect's .mkv, Record3D's .r3d, or .npz.
+    /// A recording: an RGBD folder, .mcap, .bag, .db3 or a rosbag2 folder, Azure Kinect's .mkv, Record3D's .r3d, .npz,
+    /// or one depth image (.png) with its colour beside it (depth_1.png: color_1.png, rgb_1.png or .jpg).
     #[arg(long, value_name = "REC")]
     pub(crate) input: PathBuf,
     #[command(flatten)]
@@ -226,8 +228,8 @@ pub(crate) struct CompositeArgs {
 #[derive(Debug, Args)]
 pub(crate) struct ImportArgs {
     /// A body (.npz in SMPL layout), a garment (.obj with or without stitches, .glb, MakeHuman's .mhclo, a sewing pattern
-    /// of ours or GarmentCode's .json), a measured fabric (.json), or a recording (.mcap, .bag, .db3, .mkv, .r3d, .npz with
-    /// depth, or a folder).
+    /// of ours or GarmentCode's .json), a measured fabric (.json), or a recording (.mcap, .bag, .db3, .mkv, .r3d, .npz or
+    /// .png with depth, or a folder).
     #[arg(value_name = "FILE")]
     pub(crate) input: PathBuf,
     #[command(flatten)]

@@ -70,6 +70,44 @@ fn names_sort_as_numbers_and_colour_pairs_by_them() {
 }
 
 #[test]
+fn one_depth_image_is_a_recording_with_its_colour_beside_it() {
+    let dir = tempfile::tempdir().expect("temporary folder");
+    let (image, camera) = (
+        dir.path().join("depth/Depth_7.png"),
+        dir.path().join("k.json"),
+    );
+    depth(dir.path(), "Depth_7.png", 1234);
+    let e = refusal(&image);
+    assert!(e.contains("--camera camera.json"), "{e}");
+    fs::write(
+        &camera,
+        CAMERA.replace('}', r#", "color_time_offset_s": 0.01}"#),
+    )
+    .expect("written");
+    let options = RecordingOptions {
+        camera: Some(camera),
+        ..RecordingOptions::default()
+    };
+    let open = || open_as_recorded_with(&image, &options);
+    let mut alone = open().expect("opens");
+    let noted = alone.untaken().join("; ");
+    assert!(
+        noted.contains("color_7.png") && noted.contains("offset"),
+        "{noted}"
+    );
+    let frame = alone.next_frame().expect("reads").expect("a frame");
+    assert_eq!((frame.depth.at(3, 2), frame.color), (1234, None));
+    assert!(alone.next_frame().expect("ends").is_none());
+
+    color(dir.path(), "depth/rgb_7.png", (4, 3), 99);
+    let frame = open().expect("opens").next_frame().expect("reads");
+    assert_eq!(frame.and_then(|f| f.color).map(|c| c.data()[0]), Some(99));
+    color(dir.path(), "depth/color_7.png", (4, 3), 98);
+    let e = open().err().expect("ambiguous").to_string();
+    assert!(e.contains("rgb_7.png") && e.contains("color_7.png"), "{e}");
+}
+
+#[test]
 fn names_that_are_times_are_times() {
     let dir = folder(CAMERA);
     depth(dir.path(), "1305031102.160407.png", 1);

@@ -3,6 +3,7 @@
 mod datasets;
 mod index;
 mod names;
+mod pair;
 mod pairing;
 mod reader;
 mod resume;

@@ -32,7 +32,7 @@ pub(super) struct ColorEntry {
 }
 
 impl ColorEntry {
-    fn untimed(file: &str) -> Self {
+    pub(super) fn untimed(file: &str) -> Self {
         Self {
             file: file.to_owned(),
             time_ns: None,

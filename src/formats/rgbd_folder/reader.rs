@@ -43,13 +43,21 @@ pub(crate) fn read_lenses(
     path: &Path,
     untaken: &mut Vec<String>,
 ) -> Result<LensCalibration, FormatError> {
+    Ok(read_of_pairs(path, untaken)?.lenses)
+}
+
+/// A `camera.json` for pairs of depth and colour; notes what has no effect on those.
+pub(super) fn read_of_pairs(
+    path: &Path,
+    untaken: &mut Vec<String>,
+) -> Result<CameraFile, FormatError> {
     let file = CameraFile::read(path)?;
     if file.color_time_offset_s != 0.0 {
         let name = path.display();
         let why = "has no effect: the recording holds pairs of depth and colour";
         untaken.push(format!("{name}: color_time_offset_s {why}"));
     }
-    Ok(file.lenses)
+    Ok(file)
 }
 
 /// Converts depth in the file's unit to millimetres; values out of range become 0, "no reading".
@@ -94,20 +102,28 @@ impl RgbdFolder {
                 FormatError::field(&own, "file", why)
             })?,
         };
-        let FolderIndex { entries, mut notes } =
-            FolderIndex::read(folder, file.color_time_offset_ns())?;
+        let mut index = FolderIndex::read(folder, file.color_time_offset_ns())?;
         if let Some(camera) = camera.filter(|_| own.exists()) {
-            notes.push(format!(
+            index.notes.push(format!(
                 "{}: the folder has its own camera.json",
                 camera.display()
             ));
         }
+        Self::of_images(folder.to_owned(), file, index)
+    }
+
+    /// The images of an index, relative to a folder.
+    pub(super) fn of_images(
+        folder: PathBuf,
+        camera: CameraFile,
+        index: FolderIndex,
+    ) -> Result<Self, FormatError> {
         let out = Self {
-            folder: folder.to_owned(),
-            calibration: file.lenses.pinholes(),
-            camera: file,
-            entries,
-            untaken: notes,
+            folder,
+            calibration: camera.lenses.pinholes(),
+            camera,
+            entries: index.entries,
+            untaken: index.notes,
             next: 0,
             color_time_ns: None,
         };
