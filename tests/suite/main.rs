@@ -16,6 +16,7 @@ mod garments;
 mod offline_outfit;
 mod offline_steps;
 mod on_person;
+mod others;
 mod seat;
 mod sleep;
 mod starts;

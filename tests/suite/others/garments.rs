@@ -1,0 +1,1 @@
+//! Garments in other frames, with others in the same file.

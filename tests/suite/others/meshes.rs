@@ -1,0 +1,1 @@
+//! Meshes as exporters write them.

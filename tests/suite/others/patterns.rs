@@ -1,0 +1,1 @@
+//! Sewing patterns of other programs.
