@@ -28,6 +28,8 @@ pub(super) struct GarmentPiece {
     pub(super) positions: Vec<P3>,
     pub(super) binding: SkinBinding,
     rest: RestShape,
+    /// Largest share of the way that it goes around a part of the source body.
+    pub(super) wrap: f64,
 }
 
 /// Origin of a piece's rest shape on another body.
@@ -98,6 +100,7 @@ impl PieceBuilder<'_> {
             garment,
             positions: x,
             binding,
+            wrap: shape.wrap,
             rest: if made.flat {
                 RestShape::Scaled
             } else {
@@ -134,6 +137,7 @@ impl PieceBuilder<'_> {
             binding: SkinBinding::new(self.classifier.template, &positions, |_| Vec::new()),
             positions,
             rest: RestShape::Fitted,
+            wrap: 0.0,
         }))
     }
     /// A mesh without flat panels gets even triangles.
@@ -189,7 +193,8 @@ fn regions(shape: &PieceShape, topology: &Topology, x: &[P3], middle: f32) -> Ve
 }
 
 /// Several pieces as one.
-fn merge(pieces: &[SewnObj]) -> Option<SewnObj> {
+/// One surface of some; without their stitches if there are several.
+pub(super) fn merge(pieces: &[SewnObj]) -> Option<SewnObj> {
     let mut out = pieces.first()?.clone();
     let (mut vertices, mut faces) = (
         out.obj.mesh.vertices().to_vec(),
@@ -201,7 +206,9 @@ fn merge(pieces: &[SewnObj]) -> Option<SewnObj> {
         faces.extend(p.obj.mesh.faces().iter().map(|f| f.map(|v| v + first)));
         out.obj.face_uv.extend(&p.obj.face_uv);
     }
-    out.stitches.clear();
+    if pieces.len() > 1 {
+        out.stitches.clear();
+    }
     out.obj.mesh = TriMesh::new(vertices, faces).ok()?;
     Some(out)
 }
