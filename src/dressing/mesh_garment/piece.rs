@@ -147,11 +147,7 @@ impl PieceBuilder<'_> {
             return sewn;
         }
         SewnObj {
-            obj: ObjMesh {
-                mesh: remesh(&sewn.obj.mesh, self.settings.edge),
-                uv: Vec::new(),
-                face_uv: Vec::new(),
-            },
+            obj: ObjMesh::from(remesh(&sewn.obj.mesh, self.settings.edge)),
             stitches: Vec::new(),
         }
     }
@@ -205,6 +201,7 @@ pub(super) fn merge(pieces: &[SewnObj]) -> Option<SewnObj> {
         vertices.extend(p.obj.mesh.vertices());
         faces.extend(p.obj.mesh.faces().iter().map(|f| f.map(|v| v + first)));
         out.obj.face_uv.extend(&p.obj.face_uv);
+        out.obj.origins.faces.extend(&p.obj.origins.faces);
     }
     if pieces.len() > 1 {
         out.stitches.clear();
@@ -324,11 +321,7 @@ mod tests {
         });
         let mesh = TriMesh::new(vertices.collect(), faces.collect()).expect("a tube");
         SewnObj {
-            obj: ObjMesh {
-                mesh,
-                uv: Vec::new(),
-                face_uv: Vec::new(),
-            },
+            obj: ObjMesh::from(mesh),
             stitches: Vec::new(),
         }
     }

@@ -117,13 +117,7 @@ impl MeshGarment {
         let sewn =
             in_metres(sewn, &source).map_err(|why| MeshGarmentError::Piece { piece: 0, why })?;
         let mut out = Self::build(&file.name, &sewn, source, material, settings)?;
-        out.notes.extend(note);
-        if file.turned > 0 {
-            out.notes.push(format!(
-                "{} faces turned over to agree with their neighbours",
-                file.turned
-            ));
-        }
+        out.notes.extend(note.into_iter().chain(file.notes));
         Ok(out)
     }
     /// A garment over a body in its rest pose, `mesh` in the frame of the body, metres.
@@ -137,13 +131,8 @@ impl MeshGarment {
         material: &Material,
         settings: &MeshGarmentSettings,
     ) -> Result<Self, MeshGarmentError> {
-        let obj = ObjMesh {
-            mesh,
-            uv: Vec::new(),
-            face_uv: Vec::new(),
-        };
         let sewn = SewnObj {
-            obj,
+            obj: ObjMesh::from(mesh),
             stitches: Vec::new(),
         };
         Self::build(name, &sewn, body, material, settings)
