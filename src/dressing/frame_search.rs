@@ -121,7 +121,8 @@ fn starts(wearer: &Wearer<'_>, garment: &[P3], stated: &MeshFrame) -> Vec<Start>
         for heights in [usual_heights(wearer, &samples), heights(wearer, &samples)] {
             let starts = heights.into_iter().map(|up| {
                 let guess = wearer.start(up);
-                let cost = samples.distance(wearer, &skin, &guess) + prior(wearer, &guess) + small;
+                let unusual = prior(wearer, &guess).min(settings.most_prior);
+                let cost = samples.distance(wearer, &skin, &guess) + unusual + small;
                 Start { axes, guess, cost }
             });
             out.extend(starts.min_by(|a, b| a.cost.total_cmp(&b.cost)));
@@ -139,14 +140,19 @@ impl Start {
         let (axes, settings) = (self.axes, wearer.settings);
         let samples = GarmentSamples::new(garment, axes.frame(), settings.samples, settings);
         let (cost, guess) = samples.minimise(wearer, self.guess);
-        let is_usual = axes.is_conventional();
-        let unusual = if is_usual { 0.0 } else { settings.unusual };
+        let prior = prior(wearer, &guess);
+        let distance = cost - prior;
+        let axes_price = match axes.is_conventional() {
+            true => 0.0,
+            false => settings.unusual,
+        };
+        let small = small(extent(garment) * axes.unit as f32, settings);
         Placed {
             axes,
-            distance: cost - prior(wearer, &guess),
+            distance,
             samples,
             guess,
-            cost: cost + unusual + small(extent(garment) * axes.unit as f32, settings),
+            cost: distance + prior.min(settings.most_prior) + axes_price + small,
         }
     }
 }
@@ -253,10 +259,18 @@ mod tests {
     fn unit_axes_and_shift_of_an_offset_skin_are_found() {
         let (t, settings) = (embedded::template(), GuessSettings::default());
         let vest = vest(&settings);
-        for axes in FileAxes::candidates(1.0, [0.02, 50.0], &MeshFrame::default()) {
-            if ![1.0, 0.01, 0.0254].contains(&axes.unit) {
-                continue;
-            }
+        for (unit, up, facing) in [
+            (1.0, "y", "z"),
+            (0.01, "z", "-y"),
+            (0.0254, "-x", "y"),
+            (0.001, "-y", "-z"),
+        ] {
+            let axis = |name: &str| name.parse::<MeshAxis>().expect("an axis");
+            let axes = FileAxes {
+                unit,
+                up: axis(up),
+                facing: axis(facing),
+            };
             let back = axes.frame().rotation.transpose();
             let file: Vec<P3> = vest.iter().map(|p| back * p / axes.unit as f32).collect();
             let (frame, words) = locate(&t, &file, &MeshFrame::default(), &settings).expect("worn");

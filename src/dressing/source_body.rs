@@ -198,6 +198,10 @@ impl SourceBody {
         }
         self.under(garment, stated, settings)
     }
+    /// From its file to metres.
+    pub(super) fn frame(&self) -> FileFrame {
+        self.frame
+    }
     /// Metres in a unit of the file.
     pub(super) fn unit(&self) -> f32 {
         self.frame.scale

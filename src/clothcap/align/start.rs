@@ -35,22 +35,28 @@ pub fn find_frame(
     file: &ScanMesh,
 ) -> Result<(ScanFrame, Start), CaptureError> {
     let settings = AlignmentSettings::default();
-    let mut best: Option<(ScanFrame, Start)> = None;
+    let mut best: Option<(f64, ScanFrame, Start)> = None;
     let mut fault = None;
     for frame in ScanFrame::candidates(&file.points)? {
         let scan = BodyScan::new(file, &frame)?;
         match search_person(template, &scan, &settings) {
-            Ok(start) if best.as_ref().is_none_or(|b| start.error < b.1.error) => {
-                let is_certain = start.error < settings.search.certain;
-                best = Some((frame, start));
-                if is_certain {
+            Ok(start) => {
+                let is_downward = frame.up.iter().any(|c| *c < -settings.search.upright);
+                let price = match is_downward {
+                    true => start.error * settings.search.downward,
+                    false => start.error,
+                };
+                if best.as_ref().is_none_or(|b| price < b.0) {
+                    best = Some((price, frame, start));
+                }
+                if price < settings.search.certain {
                     break;
                 }
             }
-            Ok(_) => {}
             Err(e) => fault = fault.or(Some(e)),
         }
     }
+    let best = best.map(|(_, frame, start)| (frame, start));
     let nobody = || CaptureError::NoPerson {
         why: "it has no upright frame".into(),
     };

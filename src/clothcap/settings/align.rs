@@ -114,6 +114,10 @@ settings! {
         pub worst: f64 = 0.05,
         /// Mean robust distance below which a unit and up axis is taken without trying others, metres.
         pub certain: f64 = 0.035,
+        /// Component of the up axis below whose negative a frame is upside down.
+        pub upright: f64 = 0.5,
+        /// Factor on the error of frames that stand on their head: few files do, and raised arms look like legs.
+        pub downward: f64 = 1.5,
         /// Share of the scan's points left out at each end of an axis: strays.
         pub strays: f64 = 0.002,
         /// Nearest point drawn, metres.

@@ -8,6 +8,7 @@ use super::sizing::{Sizing, SourceCloth};
 use super::skin_lift::lifted;
 use crate::body_sections::BodySections;
 use crate::error::MeshGarmentError;
+use crate::file_frame::FileFrame;
 use crate::finished::FinishedGarment;
 use crate::retarget::Retargeting;
 use crate::settings::MeshGarmentSettings;
@@ -59,6 +60,8 @@ pub struct MeshGarment {
     /// Image in place of the colour, for texture coordinates of its drawn meshes; see [`MeshGarment::with_image`].
     pub image: Option<Arc<FabricImage>>,
     source: Arc<Template>,
+    /// From its file to the source body.
+    frame: FileFrame,
     /// Innermost first.
     pub(super) pieces: Vec<GarmentPiece>,
     /// Order on the body; `None` for that of its kind.
@@ -164,6 +167,7 @@ impl MeshGarment {
             color: None,
             image: None,
             source: source.template.clone(),
+            frame: source.frame(),
             pieces,
             layer: None,
             sizing: None,
@@ -259,6 +263,10 @@ impl MeshGarment {
         let is_outer =
             |p: &GarmentPiece| matches!(p.garment.kind, GarmentKind::Top | GarmentKind::Dress);
         u8::from(self.pieces.iter().any(is_outer))
+    }
+    /// Points of its file over the body that it was made on: metres, y up, facing +z.
+    pub fn in_metres(&self, points: &[P3]) -> Vec<P3> {
+        points.iter().map(|p| self.frame.to_metres(p)).collect()
     }
     /// Vertices of all pieces.
     pub fn vertices(&self) -> usize {

@@ -158,6 +158,8 @@ settings! {
         pub worn: f32 = 0.06,
         /// Variances beyond which a floor at an unusual height costs no more.
         pub floor_cap: f64 = 25.0,
+        /// Most that an unusual place and stature count among frames, metres: a file may have its zero anywhere.
+        pub most_prior: f32 = 0.012,
         /// Height over the floor below which no garment hangs, metres.
         pub underground: f64 = -0.05,
         /// Largest extent below which a garment is a small one, metres.

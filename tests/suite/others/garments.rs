@@ -10,8 +10,8 @@ use tryon::dressing::{
 use tryon::formats::mesh_frame::upright_rotation;
 use tryon::formats::{MeshAxis, MeshFrame};
 use tryon::garment::{Material, Size, library};
-use tryon::geometry::math::{Body, P3, Rigid, World};
-use tryon::geometry::mesh::Face;
+use tryon::geometry::math::{Body, P3, Rigid, V3, World};
+use tryon::geometry::mesh::{Face, Topology, TriMesh, face_normal};
 
 /// A surface as a program exports it.
 #[derive(Clone, Debug)]
@@ -70,6 +70,32 @@ impl Export {
                 .collect(),
         }
     }
+    /// Cloth with a thickness [m]: an inner sheet, joined at the rims.
+    fn thick(&self, thickness: f32) -> Self {
+        let mesh = TriMesh::new(self.vertices.clone(), self.faces.clone()).expect("a surface");
+        let topology = Topology::new(&mesh).expect("a sheet");
+        let n = self.vertices.len() as u32;
+        let mut normals = vec![V3::zeros(); n as usize];
+        for f in &self.faces {
+            let normal = face_normal(&self.vertices, f);
+            f.iter().for_each(|v| normals[*v as usize] += normal);
+        }
+        let inner = self.vertices.iter().zip(&normals);
+        let mut out = self.clone();
+        out.vertices
+            .extend(inner.map(|(p, n)| p - n.normalize() * thickness));
+        out.faces
+            .extend(self.faces.iter().map(|[a, b, c]| [a + n, c + n, b + n]));
+        for [a, b] in topology
+            .edges()
+            .iter()
+            .filter(|e| e.twin.is_none())
+            .map(|e| e.v)
+        {
+            out.faces.extend([[b, a, a + n], [b, a + n, b + n]]);
+        }
+        out
+    }
     fn save(&self, folder: &Path, name: &str) -> PathBuf {
         let mut text = String::new();
         for p in &self.vertices {
@@ -116,7 +142,13 @@ fn exports_of_one_shirt_are_one_shirt() {
     let [shirt, person] = Export::shirt_and_person();
     let plain = read(&shirt.save(folder.path(), "plain"), MeshFrame::default()).expect("worn");
     let with_person = shirt.beside(&person);
+    let thick = shirt.thick(0.003);
     let exports = [
+        ("decimetres", 0.1, "y", "z", &shirt),
+        ("z_up_mm", 0.001, "z", "-y", &shirt),
+        ("z_up_side", 1.0, "z", "x", &shirt),
+        ("thick", 1.0, "y", "z", &thick),
+        ("thick_z_up_inches", 0.0254, "z", "-y", &thick),
         ("centimetres", 0.01, "y", "z", &shirt),
         ("millimetres", 0.001, "y", "z", &shirt),
         ("inches", 0.0254, "y", "z", &shirt),

@@ -3,6 +3,7 @@
 use crate::recording::RecordingArgs;
 use clap::{Args, Subcommand, ValueEnum};
 use std::path::PathBuf;
+use tryon::formats::mesh_frame::metres_per_unit;
 
 #[derive(Debug, Args)]
 pub(crate) struct ClothcapArgs {
@@ -39,8 +40,8 @@ pub(crate) struct ScanFrameArgs {
     /// Body template in SMPL layout; the embedded body without it.
     #[arg(long, value_name = "NPZ")]
     pub(crate) body: Option<PathBuf>,
-    /// Metres per unit of the scans; without it unit and up axis are found.
-    #[arg(long, value_name = "METRES")]
+    /// Unit of the scans: m, dm, cm, mm, inch, foot, or metres as a number. Without it unit and up axis are found.
+    #[arg(long, value_parser = metres_per_unit, value_name = "UNIT")]
     pub(crate) unit: Option<f64>,
     /// Direction against gravity in the scans (with --unit).
     #[arg(long, value_name = "AXIS", default_value = "y", requires = "unit")]

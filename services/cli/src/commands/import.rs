@@ -34,8 +34,8 @@ pub(crate) fn run(args: &ImportArgs) -> Result<ExitCode> {
         "glb" | "gltf" => {
             let g = read_glb(path)?;
             describe(&g.mesh)?;
-            as_garment(args)?;
-            write(args, "garment", g.mesh.vertices(), g.mesh.faces(), &g.uv)?;
+            let vertices = as_garment(args, g.mesh.vertices().to_vec())?;
+            write(args, "garment", &vertices, g.mesh.faces(), &g.uv)?;
         }
         "json" => json(args)?,
         "mhclo" => clothes(args)?,
@@ -114,8 +114,8 @@ fn obj(args: &ImportArgs) -> Result<()> {
         );
     }
     describe(&sewn.obj.mesh)?;
-    as_garment(args)?;
     let (vertices, uv, faces, _) = sewn.obj.unwelded();
+    let vertices = as_garment(args, vertices)?;
     write(args, "garment", &vertices, &faces, &uv)
 }
 
@@ -132,14 +132,19 @@ fn describe(surface: &TriMesh) -> Result<()> {
     Ok(())
 }
 
-/// Findings about a mesh that is worn, or why it is not.
-fn as_garment(args: &ImportArgs) -> Result<()> {
+/// Says how a mesh is worn, or why it is not; its vertices, in metres, y up, facing +z where it is.
+fn as_garment(args: &ImportArgs, vertices: Vec<P3>) -> Result<Vec<P3>> {
     let cotton = Material::preset("cotton")?;
     match input::mesh_garment(&args.input, None, args.frame.stated(), &cotton) {
-        Ok(garment) => println!("as a garment: {}", garment.notes.join("; ")),
-        Err(e) => println!("as a garment: {e:#}"),
+        Ok(garment) => {
+            println!("as a garment: {}", garment.notes.join("; "));
+            Ok(garment.in_metres(&vertices))
+        }
+        Err(e) => {
+            println!("as a garment: {e:#}");
+            Ok(vertices)
+        }
     }
-    Ok(())
 }
 
 /// MakeHuman clothes, with the OBJ beside them.

@@ -26,7 +26,7 @@ fn segment_all(args: &ClothcapSegmentArgs) -> Result<()> {
     if let Some(start) = scans.start.take() {
         segmenter.start_at(start);
     }
-    let mut first = None;
+    let (mut first, mut rows) = (None, Vec::new());
     let bar = input::progress(Some(scans.files.len() as u64), "segmenting");
     for file in &scans.files {
         let scan = scans.read(file)?;
@@ -40,9 +40,11 @@ fn segment_all(args: &ClothcapSegmentArgs) -> Result<()> {
             &labels,
             &args.out.join(format!("{}.ply", Scans::name(file))),
         )?;
+        rows.push(json!({"scan": Scans::name(file), "points": scan.points.len()}));
         bar.inc(1);
     }
     bar.finish_and_clear();
+    scans.write_report(&rows, &args.out)?;
     let labelling = first.context("no scan was segmented")?;
     let cloth = MultiCloth::new(segmenter.cloth(), &labelling);
     let parts = parts(&labelling, &cloth);
