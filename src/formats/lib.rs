@@ -13,7 +13,7 @@
 //!   [`mod@rectified`]; set upright: [`mod@reoriented`].
 //! - Lossless depth compression: [`mod@image::depth_codec`].
 //! - Motion clips: [`mod@bvh`], [`mod@asf_amc`].
-//! - GlTF, OBJ, MakeHuman: [`mod@gltf`], [`mod@obj`], [`mod@mhclo`].
+//! - GlTF, OBJ, MakeHuman: [`mod@gltf`], [`mod@obj`], [`mod@mhclo`]; unit and axes of a mesh file: [`mod@mesh_frame`].
 //! - Image size limits: [`mod@image::limits`].
 //!
 //! Wire and processes:
@@ -35,6 +35,7 @@ pub mod gltf;
 pub mod image;
 mod k4a_file;
 mod mcap_file;
+pub mod mesh_frame;
 mod messages;
 pub mod mhclo;
 pub mod morph_target;
@@ -67,6 +68,7 @@ pub use camera_json::CameraFile;
 pub use error::FormatError;
 pub use k4a_file::K4aReader;
 pub use mcap_file::McapWriter;
+pub use mesh_frame::{MeshAxis, MeshFrame};
 pub use messages::live;
 pub use motion::read_motion;
 pub use motion_clip::MotionClip;
