@@ -71,7 +71,7 @@ impl<'a> GuessFit<'a> {
             } else {
                 V3::zeros()
             },
-            ..FileFrame::METRES
+            ..FileFrame::metres()
         };
         let rest = template.personalise(&BodyShape::default());
         Self {

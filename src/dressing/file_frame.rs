@@ -1,5 +1,6 @@
 //! Unit and frame of a mesh file.
 
+use nalgebra::Matrix3;
 use tryon_geometry::math::{P3, V3};
 
 /// Map from a file's own unit and frame to metres, y up.
@@ -7,24 +8,23 @@ use tryon_geometry::math::{P3, V3};
 pub(super) struct FileFrame {
     /// Metres in one unit of the file.
     pub(super) scale: f32,
-    pub(super) z_up: bool,
+    /// From the file's axes to y up, facing +z.
+    pub(super) rotation: Matrix3<f32>,
     /// Added last, metres.
     pub(super) shift: V3,
 }
 
 impl FileFrame {
-    pub(super) const METRES: Self = Self {
-        scale: 1.0,
-        z_up: false,
-        shift: V3::new(0.0, 0.0, 0.0),
-    };
+    /// The project's own frame.
+    pub(super) fn metres() -> Self {
+        Self {
+            scale: 1.0,
+            rotation: Matrix3::identity(),
+            shift: V3::zeros(),
+        }
+    }
     pub(super) fn to_metres(self, p: &P3) -> P3 {
-        let q = if self.z_up {
-            P3::new(p.x, p.z, -p.y)
-        } else {
-            *p
-        };
-        q * self.scale + self.shift
+        self.rotation * p * self.scale + self.shift
     }
     /// Metres in a unit (m, dm, cm or mm) in which `extent` units lie strictly between `limits` (m).
     pub(super) fn unit_of(extent: f32, limits: [f32; 2]) -> Option<f32> {

@@ -5,17 +5,15 @@ use super::error::MeshGarmentError;
 use super::file_frame::FileFrame;
 use super::rig_standing::rig_standing;
 use super::settings::GuessSettings;
+use nalgebra::Matrix3;
 use std::path::Path;
 use std::sync::Arc;
-use tryon_body::import::template_from_smpl;
+use tryon_body::import::{StandingFrame, read_body};
 use tryon_body::{BodyError, Template, embedded};
-use tryon_formats::npz::read_smpl;
+use tryon_formats::mesh_frame::{MeshFrame, upright_rotation};
 use tryon_formats::obj::read_obj;
 use tryon_geometry::math::{P3, V3};
 use tryon_geometry::mesh::{Face, MeshError, Topology, TriMesh};
-
-/// Limits of a grown body's stature, metres; they decide the file's unit.
-const STATURE: [f32; 2] = [1.1, 2.4];
 
 /// A body in the pose and place in which garments were made on it.
 #[derive(Clone, Debug)]
@@ -32,48 +30,74 @@ pub struct SourceBody {
 }
 
 impl SourceBody {
-    /// Reads a body: `.npz` in SMPL layout (its rest pose), or `.obj`: a body that stands upright with its arms away from
-    /// its sides, y or z up, in m, dm, cm or mm. An OBJ's skeleton is found by [`rig_standing`]; only its largest
-    /// component is skin.
+    /// As [`Self::read_in`], in a frame that the body itself shows.
     ///
     /// # Errors
-    /// A fault of the file, or a mesh in which no person is found.
+    /// As [`Self::read_in`].
     pub fn read(path: &Path) -> Result<Self, MeshGarmentError> {
+        Self::read_in(path, &MeshFrame::default())
+    }
+    /// Reads a body: `.npz` in SMPL layout (its rest pose), or `.obj`: a body that stands upright with its arms away from
+    /// its sides. Unit and axes are recognised from the body, or `stated`. An OBJ's skeleton is found by [`rig_standing`];
+    /// only its largest component is skin.
+    ///
+    /// # Errors
+    /// A fault of the file, a body whose frame is unclear, or a mesh in which no person is found.
+    pub fn read_in(path: &Path, stated: &MeshFrame) -> Result<Self, MeshGarmentError> {
         let name = path
             .file_name()
             .map_or_else(String::new, |n| n.to_string_lossy().into_owned());
-        if path.extension().is_some_and(|e| e == "npz") {
-            let template = template_from_smpl(&name, &read_smpl(path)?)?;
-            let file = template.mesh().vertices().to_vec();
+        let described = |notes: &[String]| match notes.is_empty() {
+            true => name.clone(),
+            false => format!("{name} ({})", notes.join("; ")),
+        };
+        if path
+            .extension()
+            .is_some_and(|e| e.eq_ignore_ascii_case("npz"))
+        {
+            let body = read_body(path, stated)?;
             return Ok(Self {
-                template: Arc::new(template),
-                file,
-                frame: FileFrame::METRES,
+                description: described(&body.notes),
+                // Garments made on it have the frame of its file.
+                file: body.file_vertices,
+                frame: FileFrame {
+                    scale: body.metres_per_unit as f32,
+                    rotation: body.matrix.cast(),
+                    shift: V3::zeros(),
+                },
+                template: Arc::new(body.template),
                 is_known: true,
-                description: name,
             });
         }
         let mesh = read_obj(path)?.mesh;
-        let unknown = |why: &str| MeshGarmentError::NotFound(format!("{}: {why}", path.display()));
-        let (lo, hi) = mesh.bounds().ok_or_else(|| unknown("it has no vertices"))?;
-        let size = hi - lo;
-        let z_up = size.z > size.y;
-        let tall = if z_up { size.z } else { size.y };
-        let scale = FileFrame::unit_of(tall, STATURE)
-            .ok_or_else(|| unknown(&format!("{tall} high is no person in m, dm, cm or mm")))?;
+        let unknown =
+            |why: String| MeshGarmentError::NotFound(format!("{}: {why}", path.display()));
+        let skin = largest_component(&mesh).map_err(BodyError::Mesh)?;
+        let standing = StandingFrame::find(&skin, stated).map_err(unknown)?;
+        let rotation =
+            upright_rotation(standing.up, standing.facing).unwrap_or_else(Matrix3::identity);
         let frame = FileFrame {
-            scale,
-            z_up,
+            scale: standing.metres_per_unit as f32,
+            rotation: rotation.cast(),
             shift: V3::zeros(),
         };
-        let skin = largest_component(&mesh, frame).map_err(BodyError::Mesh)?;
-        let (template, fit) = rig_standing(skin).map_err(MeshGarmentError::NotFound)?;
+        let vertices = skin.vertices().iter().map(|p| frame.to_metres(p)).collect();
+        let faces = skin.faces().iter().map(|f| match standing.is_inside_out {
+            true => [f[0], f[2], f[1]],
+            false => *f,
+        });
+        let skin = TriMesh::new(vertices, faces.collect()).map_err(BodyError::Mesh)?;
+        let (template, fit) = rig_standing(skin).map_err(|why| unknown(format!("{why}; its frame was taken as {} up, facing {}: say `--up` and `--facing` if it is another", standing.up, standing.facing)))?;
         Ok(Self {
             template: Arc::new(template),
             file: mesh.vertices().to_vec(),
             frame,
             is_known: true,
-            description: format!("{name}, skeleton found within {:.0} mm", fit * 1e3),
+            description: format!(
+                "{}, skeleton found within {:.0} mm",
+                described(&standing.notes),
+                fit * 1e3
+            ),
         })
     }
     /// The embedded body, scaled, moved and with its arms turned so that garment vertices lie just above its skin: a
@@ -108,7 +132,7 @@ impl SourceBody {
     pub fn of_template(template: Arc<Template>) -> Self {
         Self {
             file: template.mesh().vertices().to_vec(),
-            frame: FileFrame::METRES,
+            frame: FileFrame::metres(),
             is_known: true,
             description: template.name().to_owned(),
             template,
@@ -129,7 +153,7 @@ impl SourceBody {
     }
 }
 
-fn largest_component(mesh: &TriMesh, frame: FileFrame) -> Result<TriMesh, MeshError> {
+fn largest_component(mesh: &TriMesh) -> Result<TriMesh, MeshError> {
     let (label, count) = Topology::new(mesh)?.components();
     let mut sizes = vec![0usize; count];
     label.iter().for_each(|l| sizes[*l as usize] += 1);
@@ -140,7 +164,7 @@ fn largest_component(mesh: &TriMesh, frame: FileFrame) -> Result<TriMesh, MeshEr
     let mut vertices = Vec::new();
     for (i, _) in label.iter().enumerate().filter(|(_, l)| **l == largest) {
         index[i] = vertices.len() as u32;
-        vertices.push(frame.to_metres(&mesh.vertices()[i]));
+        vertices.push(mesh.vertices()[i]);
     }
     let own = |f: &&Face| label[f[0] as usize] == largest;
     let faces = mesh.faces().iter().filter(own);
