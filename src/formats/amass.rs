@@ -211,3 +211,119 @@ fn places(row: &[f64], at: V3d, upright: &UnitQuaternion<f64>) -> Vec<P3d> {
     }
     out
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use npyz::WriterBuilder;
+
+    /// Writes a file of arrays.
+    fn write(dir: &Path, arrays: &[(&str, &[u64], Vec<f64>)]) -> std::path::PathBuf {
+        let path = dir.join("motion.npz");
+        let mut zip = npyz::npz::NpzWriter::create(&path).expect("create");
+        for (name, shape, data) in arrays {
+            let entry = zip.array::<f64>(name, Default::default()).expect("entry");
+            let mut entry = entry
+                .default_dtype()
+                .shape(shape)
+                .begin_nd()
+                .expect("begin");
+            entry.extend(data.iter().copied()).expect("write");
+            entry.finish().expect("finish");
+        }
+        path
+    }
+
+    /// Two frames of SMPL+H: upright in the data set's frame, facing −y; then the left elbow bent to the front.
+    fn poses(width: usize) -> Vec<f64> {
+        let mut out = vec![0.0; 2 * width];
+        for frame in 0..2 {
+            // A quarter turn about x takes SMPL's y up to z up.
+            out[frame * width] = FRAC_PI_2;
+        }
+        out[width + 18 * NUMBERS + 1] = -FRAC_PI_2;
+        out
+    }
+
+    #[test]
+    fn z_up_becomes_y_up_and_the_rate_is_kept() {
+        let dir = tempfile::tempdir().expect("dir");
+        for width in WIDTHS {
+            let rate = if width == 165 { RATES[1] } else { RATES[0] };
+            let trans = vec![0.0, 0.0, 0.9, 0.0, -1.0, 0.9];
+            let path = write(
+                dir.path(),
+                &[
+                    ("poses", &[2, width as u64], poses(width)),
+                    ("trans", &[2, 3], trans),
+                    (rate, &[], vec![60.0]),
+                ],
+            );
+            let clip = read_amass(&path).expect("reads");
+            assert_eq!((clip.frames.len(), clip.period), (2, 1.0 / 60.0));
+            let at =
+                |frame: usize, name: &str| clip.frames[frame][clip.joint(&[name]).expect(name)];
+            assert!((at(0, "pelvis") - P3d::new(0.0, 0.9, 0.0)).norm() < 1e-12);
+            // −y of the data set is ahead, +z: the body walked a metre.
+            assert!((at(1, "pelvis") - P3d::new(0.0, 0.9, 1.0)).norm() < 1e-12);
+            assert!(at(0, "head").y > 1.3 && at(0, "left_ankle").y < 0.2);
+            assert!(at(0, "left_wrist").x > 0.5 && at(0, "left_foot").z > 0.05);
+            // The bent forearm points ahead.
+            let fore = (at(1, "left_wrist") - at(1, "left_elbow")).normalize();
+            assert!((fore - V3d::z()).norm() < 1e-9, "{fore}");
+            assert!(clip.first_is_rest());
+        }
+    }
+
+    #[test]
+    fn parts_are_the_same_and_faults_are_named() {
+        let dir = tempfile::tempdir().expect("dir");
+        let trans = || vec![0.0; 6];
+        let whole = write(
+            dir.path(),
+            &[
+                ("poses", &[2, 156], poses(156)),
+                ("trans", &[2, 3], trans()),
+                (RATES[0], &[1], vec![120.0]),
+            ],
+        );
+        let right = read_amass(&whole).expect("reads");
+        let rows = poses(156);
+        let part = |from: usize, to: usize| [&rows[from..to], &rows[156 + from..156 + to]].concat();
+        let parts: [(&str, &[u64], Vec<f64>); 4] = [
+            ("root_orient", &[2, 3], part(0, 3)),
+            ("pose_body", &[2, 63], part(3, 66)),
+            ("trans", &[2, 3], trans()),
+            (RATES[1], &[], vec![120.0]),
+        ];
+        assert_eq!(
+            read_amass(&write(dir.path(), &parts)).expect("reads"),
+            right
+        );
+        let fault = |arrays: &[(&str, &[u64], Vec<f64>)]| {
+            read_amass(&write(dir.path(), arrays))
+                .expect_err("must be refused")
+                .to_string()
+        };
+        let poses_only = ("poses", &[2u64, 156][..], poses(156));
+        assert!(fault(&[poses_only.clone()]).contains("`trans`"));
+        let e = fault(&[poses_only.clone(), ("trans", &[2, 3], trans())]);
+        assert!(
+            e.contains("mocap_framerate") && e.contains("mocap_frame_rate"),
+            "{e}"
+        );
+        assert!(fault(&[poses_only.clone(), ("trans", &[1, 3], vec![0.0; 3])]).contains("[2, 3]"));
+        assert!(
+            fault(&[
+                poses_only,
+                ("trans", &[2, 3], trans()),
+                (RATES[0], &[], vec![0.0])
+            ])
+            .contains("1 to 1000")
+        );
+        assert!(fault(&[("poses", &[2, 70], vec![0.0; 140])]).contains("[frames, 156]"));
+        assert!(
+            fault(&[("v_template", &[1, 3], vec![0.0; 3])]).contains("the file has v_template")
+        );
+    }
+}

@@ -67,7 +67,7 @@ impl MotionClip {
             })
         })
     }
-    /// Whether the first frame is the rest pose, in words, and the file's own notes.
+    /// Frame rate and role of the first frame in words, and the notes of the file.
     pub fn statements(&self) -> Vec<String> {
         let first = match self.first_is_rest() {
             true => "its first frame is the rest pose, and is played as a frame",

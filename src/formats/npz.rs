@@ -309,6 +309,24 @@ mod tests {
         }
     }
 
+    /// STAR's pose features are quaternions and a shape coefficient: 4 · 23 + 1 for 24 joints, 1 for one.
+    #[test]
+    fn pose_directions_of_star_are_left_out_and_said() {
+        let dir = tempfile::tempdir().expect("dir");
+        let star = read_smpl(write(dir.path(), "posedirs", &[3, 3, 1], &[0.0; 9])).expect("valid");
+        assert!(star.pose_directions.is_empty() && star.notes[0].contains("STAR"));
+        assert!(!star.has_names);
+    }
+
+    #[test]
+    fn default_names_stop_where_layouts_part() {
+        assert_eq!(default_names(24)[22..], ["left_hand", "right_hand"]);
+        assert_eq!(
+            default_names(55)[20..24],
+            ["left_wrist", "right_wrist", "joint_22", "joint_23"]
+        );
+    }
+
     #[test]
     fn broken_files_are_errors() {
         let dir = tempfile::tempdir().expect("dir");

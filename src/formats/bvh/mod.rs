@@ -240,6 +240,109 @@ mod tests {
         assert!(fault(&ARM.replace("Frames: 2", "Frames: 4000000000")).contains("ends where"));
     }
 
+    /// As exporters write the same file.
+    #[test]
+    fn variants_of_the_text_are_the_same_clip() {
+        let right = parse_bvh(ARM, Path::new("a.bvh")).expect("reads");
+        for text in [
+            format!("\u{feff}{ARM}"),
+            ARM.replace('\n', "\r\n"),
+            ARM.replace('\n', "\r"),
+            ARM.replace("Frame Time: 0.01", "Frame Time:0.01"),
+            ARM.replace("Frame Time: 0.01", "Frame Time :0.01"),
+            ARM.replace("Frame Time: 0.01", "frame time\t:\t0.01"),
+            ARM.replace("Frames: 2", "Frames:2"),
+            ARM.replace("Frames: 2", "FRAMES 2"),
+            ARM.replace("\n {", "{").replace("\n{", " {"),
+            ARM.replace("End Site", "End Effector of the arm"),
+            ARM.to_ascii_lowercase(),
+        ] {
+            let clip = parse_bvh(&text, Path::new("a.bvh")).expect(&text);
+            assert_eq!(clip, right, "{text}");
+        }
+        let spaced = ARM
+            .replace("ROOT hip", "ROOT Bip01 Hips")
+            .replace("JOINT arm", "JOINT\tmixamorig:Left Arm");
+        let clip = parse_bvh(&spaced, Path::new("a.bvh")).expect("reads");
+        assert_eq!(
+            clip.names,
+            ["Bip01 Hips", "mixamorig:Left Arm", "mixamorig:Left Arm_end"]
+        );
+        assert_eq!((clip.frames, clip.period), (right.frames, right.period));
+    }
+
+    #[test]
+    fn positions_of_every_joint_replace_offsets_or_count_from_them() {
+        let with = |channels: &str, rows: [&str; 2]| {
+            let text = ARM.replace("CHANNELS 3 Zrotation Xrotation Yrotation", channels);
+            let text = text
+                .replace("0 1 0 0 0 0 90 0 0", rows[0])
+                .replace("0 1 0 90 0 0 0 90 0", rows[1]);
+            parse_bvh(&text, Path::new("a.bvh")).expect("reads")
+        };
+        let right = parse_bvh(ARM, Path::new("a.bvh")).expect("reads");
+        let six = "CHANNELS 6 Xposition Yposition Zposition Zrotation Xrotation Yrotation";
+        let placed = with(
+            six,
+            ["0 1 0 0 0 0 1 0 0 90 0 0", "0 1 0 90 0 0 1 0 0 0 90 0"],
+        );
+        assert_eq!((&placed.frames, placed.notes.len()), (&right.frames, 0));
+        let relative = with(
+            six,
+            ["0 1 0 0 0 0 0 0 0 90 0 0", "0 1 0 90 0 0 0 0 0 0 90 0"],
+        );
+        assert_eq!(relative.frames, right.frames);
+        assert!(relative.notes[0].contains("offsets"));
+        // Other orders, and a joint without channels.
+        let mixed = with(
+            "CHANNELS 4 Zrotation Xposition Xrotation Yrotation",
+            ["0 1 0 0 0 0 90 1 0 0", "0 1 0 90 0 0 0 1 90 0"],
+        );
+        assert_eq!(mixed.frames, right.frames);
+        let fixed = with("CHANNELS 0", ["0 1 0 0 0 0", "0 1 0 90 0 0"]);
+        assert!((fixed.frames[1][2] - P3d::new(0.0, 4.0, 0.0)).norm() < 1e-12);
+    }
+
+    #[test]
+    fn counts_rates_and_roots_are_said() {
+        let read = |text: String| parse_bvh(&text, Path::new("a.bvh"));
+        let more = read(ARM.replace("Frames: 2", "Frames: 1")).expect("reads");
+        assert!(more.frames.len() == 2 && more.notes[0].contains("states 1"));
+        for (text, words) in [
+            (ARM.replace("Frames: 2", "Frames: 3"), "frame 2 of 3"),
+            (ARM.replace("Frames: 2", "Frames: 0"), "at least one"),
+            (ARM.replace("0.01", "30"), "seconds a frame"),
+            (ARM.replace("0.01", "-1"), "seconds a frame"),
+            (ARM.replace("0.01", "0,01"), "`0,01`"),
+            (format!("{ARM}1 2 3\n"), "frame 2 of 2"),
+        ] {
+            let why = read(text).expect_err(words).to_string();
+            assert!(why.contains(words) && why.contains("line "), "{why}");
+        }
+        let two = ARM.replace(
+            "}\nMOTION",
+            "}\nROOT prop\n{\nOFFSET 0 0 0\nCHANNELS 1 Xposition\n}\nMOTION",
+        );
+        let two = two
+            .replace("0 1 0 0 0 0 90 0 0", "0 1 0 0 0 0 90 0 0 5")
+            .replace("0 1 0 90 0 0 0 90 0", "0 1 0 90 0 0 0 90 0 6");
+        let two = read(two).expect("reads");
+        assert!(two.notes[0].contains("2 roots (hip, prop)"));
+        assert_eq!((two.parents[3], two.frames[1][3].x), (None, 6.0));
+    }
+
+    #[test]
+    fn the_rest_pose_is_told_from_the_motion() {
+        let rest = ARM.replace("0 1 0 0 0 0 90 0 0", "0 1 0 45 0 30 0 0 0");
+        let clip = |text: &str| parse_bvh(text, Path::new("a.bvh")).expect("reads");
+        assert!(clip(&rest).first_is_rest() && !clip(ARM).first_is_rest());
+        assert!(
+            clip(&rest).statements()[0].contains(
+                "2 frames of 0.0100 s (100.000 a second), its first frame is the rest pose"
+            )
+        );
+    }
+
     proptest! {
         #[test]
         fn every_truncation_is_an_error(cut in 0usize..400) {
