@@ -11,6 +11,8 @@ const HINT: f64 = 1.5;
 /// Gain of a wrist with fingers.
 const FINGERS: f64 = 1.5;
 
+/// Standard deviation of the way along a segment over its chord: twist bones lie in line in every pose.
+const CROOKED: f64 = 0.03;
 /// Distance of a joint of hand or foot from the wrist or ankle, over both segments, at least.
 const APART: f64 = 0.03;
 /// Joints of a chain that are tried; fingers end after a dozen.
@@ -40,7 +42,7 @@ pub(super) const LEG: LimbKind = LimbKind {
     hints: [JointHint::Hip, JointHint::Knee, JointHint::Ankle],
     lower: [1.0, 0.12],
     distal: [0.22, 0.12],
-    proximal: [0.12, 0.1],
+    proximal: [0.15, 0.15],
     has_fingers: false,
 };
 
@@ -132,7 +134,10 @@ pub(super) fn fit(branches: &Branches<'_>, start: usize, kind: &LimbKind) -> Opt
             0.0
         };
         let [mean, spread] = kind.lower;
+        let chord = |a: usize, b: usize| (tree.places[chain[b]] - tree.places[chain[a]]).norm();
         deviation((lower / upper / mean).ln(), [0.0, spread])
+            + deviation(1.0 - chord(at[0], at[1]) / upper, [0.0, CROOKED])
+            + deviation(1.0 - chord(at[1], at[2]) / lower, [0.0, CROOKED])
             + deviation((sum - end) / both, kind.distal)
             + deviation(root / both, kind.proximal)
             + named.sum::<f64>()
