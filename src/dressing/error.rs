@@ -50,6 +50,27 @@ pub enum MeshGarmentError {
     /// The body that it was made on has no skeleton, and none was found for it.
     #[error("the body that the garment was made on: {0}")]
     NotFound(String),
+    /// Two frames fit a garment alike.
+    #[error("the garment lies over a body {first} as well as {second}: {option} says which")]
+    Ambiguous {
+        /// Unit and axes of the better one.
+        first: String,
+        /// Unit and axes of the other one.
+        second: String,
+        /// Option that tells them apart.
+        option: &'static str,
+    },
+    /// Cloth that lies beside the body.
+    #[error(
+        "its cloth goes {most} % of the way around a part of the body; {least} % are worn: --unit, --up and --facing say how \
+         the file was made, --garment-body on whom"
+    )]
+    NotWorn {
+        /// Largest share of the way, percent.
+        most: u32,
+        /// Least share of cloth that is worn, percent.
+        least: u32,
+    },
     /// The file has no piece to wear.
     #[error("{0}")]
     Nothing(String),

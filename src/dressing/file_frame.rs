@@ -1,14 +1,17 @@
 //! Unit and frame of a mesh file.
 
 use nalgebra::Matrix3;
+use tryon_formats::mesh_frame::{MeshAxis, MeshFrame, unit_name, upright_rotation};
 use tryon_geometry::math::{P3, V3};
 
-/// Map from a file's own unit and frame to metres, y up.
+/// Metres in the units that exporters write.
+const UNITS: [f64; 6] = [1.0, 0.1, 0.01, 0.001, 0.0254, 0.3048];
+
+/// Map from a file's own unit and frame to metres, y up, facing +z.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct FileFrame {
     /// Metres in one unit of the file.
     pub(super) scale: f32,
-    /// From the file's axes to y up, facing +z.
     pub(super) rotation: Matrix3<f32>,
     /// Added last, metres.
     pub(super) shift: V3,
@@ -17,19 +20,83 @@ pub(super) struct FileFrame {
 impl FileFrame {
     /// The project's own frame.
     pub(super) fn metres() -> Self {
-        Self {
-            scale: 1.0,
-            rotation: Matrix3::identity(),
-            shift: V3::zeros(),
-        }
+        FileAxes::OWN.frame()
     }
     pub(super) fn to_metres(self, p: &P3) -> P3 {
         self.rotation * p * self.scale + self.shift
     }
-    /// Metres in a unit (m, dm, cm or mm) in which `extent` units lie strictly between `limits` (m).
-    pub(super) fn unit_of(extent: f32, limits: [f32; 2]) -> Option<f32> {
-        let mut units = [1.0f32, 0.1, 0.01, 0.001].into_iter();
-        units.find(|s| extent * s > limits[0] && extent * s < limits[1])
+}
+
+/// Unit and axes in which a file may be written.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct FileAxes {
+    /// Metres in one unit of the file.
+    pub(super) unit: f64,
+    pub(super) up: MeshAxis,
+    pub(super) facing: MeshAxis,
+}
+
+impl FileAxes {
+    const OWN: Self = Self {
+        unit: 1.0,
+        up: MeshAxis::Y,
+        facing: MeshAxis::Z,
+    };
+
+    /// All that agree with what is stated. Units are those in which `extent` lies within `limits` (m); metres where none is.
+    pub(super) fn candidates(extent: f32, limits: [f32; 2], stated: &MeshFrame) -> Vec<Self> {
+        let is_plausible = |unit: &f64| {
+            let metres = f64::from(extent) * unit;
+            metres > f64::from(limits[0]) && metres < f64::from(limits[1])
+        };
+        let mut units: Vec<f64> = match stated.metres_per_unit {
+            Some(unit) => vec![unit],
+            None => UNITS.into_iter().filter(is_plausible).collect(),
+        };
+        if units.is_empty() {
+            units.push(1.0);
+        }
+        let axes = |stated: Option<MeshAxis>| stated.map_or(MeshAxis::ALL.to_vec(), |a| vec![a]);
+        let mut out = Vec::new();
+        for unit in units {
+            for up in axes(stated.up) {
+                let across = axes(stated.facing).into_iter();
+                let facing = across.filter(|f| f.index != up.index);
+                out.extend(facing.map(|facing| Self { unit, up, facing }));
+            }
+        }
+        out
+    }
+    /// The map to metres, without a shift.
+    pub(super) fn frame(&self) -> FileFrame {
+        let rotation = upright_rotation(self.up, self.facing);
+        FileFrame {
+            scale: self.unit as f32,
+            rotation: rotation.map_or_else(Matrix3::identity, |r| r.cast()),
+            shift: V3::zeros(),
+        }
+    }
+    /// True for the axes of most files: y up and facing z, or z up and facing -y.
+    pub(super) fn is_conventional(&self) -> bool {
+        let usual = [
+            (MeshAxis::Y, MeshAxis::Z),
+            (MeshAxis::Z, MeshAxis::Y.opposite()),
+        ];
+        usual.contains(&(self.up, self.facing))
+    }
+    /// The same, facing the other way.
+    pub(super) fn turned(&self) -> Self {
+        Self {
+            facing: self.facing.opposite(),
+            ..*self
+        }
+    }
+}
+
+impl std::fmt::Display for FileAxes {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let (unit, up, facing) = (unit_name(self.unit), self.up, self.facing);
+        write!(f, "in {unit}, {up} up, facing {facing}")
     }
 }
 

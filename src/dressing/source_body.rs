@@ -1,16 +1,15 @@
 //! The body that a mesh garment was made on: read from a file, or the embedded one fitted under the garment.
 
-use super::body_guess::{guess, locate};
 use super::error::MeshGarmentError;
-use super::file_frame::FileFrame;
+use super::file_frame::{FileAxes, FileFrame};
+use super::frame_search::{fits, guess, locate};
 use super::rig_standing::rig_standing;
-use super::settings::GuessSettings;
-use nalgebra::Matrix3;
+use super::settings::{AvatarSettings, GuessSettings};
 use std::path::Path;
 use std::sync::Arc;
 use tryon_body::import::{StandingFrame, read_body};
-use tryon_body::{BodyError, Template, embedded};
-use tryon_formats::mesh_frame::{MeshFrame, upright_rotation};
+use tryon_body::{BodyError, SkinSearch, Template, embedded};
+use tryon_formats::mesh_frame::MeshFrame;
 use tryon_formats::obj::read_obj;
 use tryon_geometry::math::{P3, V3};
 use tryon_geometry::mesh::{Face, MeshError, Topology, TriMesh};
@@ -74,20 +73,18 @@ impl SourceBody {
             |why: String| MeshGarmentError::NotFound(format!("{}: {why}", path.display()));
         let skin = largest_component(&mesh).map_err(BodyError::Mesh)?;
         let standing = StandingFrame::find(&skin, stated).map_err(unknown)?;
-        let rotation =
-            upright_rotation(standing.up, standing.facing).unwrap_or_else(Matrix3::identity);
-        let frame = FileFrame {
-            scale: standing.metres_per_unit as f32,
-            rotation: rotation.cast(),
-            shift: V3::zeros(),
+        let axes = FileAxes {
+            unit: standing.metres_per_unit,
+            up: standing.up,
+            facing: standing.facing,
         };
-        let vertices = skin.vertices().iter().map(|p| frame.to_metres(p)).collect();
-        let faces = skin.faces().iter().map(|f| match standing.is_inside_out {
-            true => [f[0], f[2], f[1]],
-            false => *f,
-        });
-        let skin = TriMesh::new(vertices, faces.collect()).map_err(BodyError::Mesh)?;
-        let (template, fit) = rig_standing(skin).map_err(|why| unknown(format!("{why}; its frame was taken as {} up, facing {}: say `--up` and `--facing` if it is another", standing.up, standing.facing)))?;
+        let frame = axes.frame();
+        let skin = framed(&skin, frame, standing.is_inside_out).map_err(BodyError::Mesh)?;
+        let (template, fit) = rig_standing(skin).map_err(|why| {
+            unknown(format!(
+                "{why}; it was taken as {axes}: say `--up` and `--facing` if it is another way"
+            ))
+        })?;
         Ok(Self {
             template: Arc::new(template),
             file: mesh.vertices().to_vec(),
@@ -105,20 +102,19 @@ impl SourceBody {
     ///
     /// # Errors
     /// When no body fits into them.
-    pub fn guess(garment: &[P3]) -> Result<Self, MeshGarmentError> {
-        Self::guess_with(garment, &GuessSettings::default())
-    }
-    /// As [`Self::guess`], with other settings.
-    ///
-    /// # Errors
-    /// As [`Self::guess`].
-    pub fn guess_with(garment: &[P3], settings: &GuessSettings) -> Result<Self, MeshGarmentError> {
-        let (template, frame) = guess(&embedded::template(), garment, settings)?;
+    pub fn guess(
+        garment: &[P3],
+        stated: &MeshFrame,
+        settings: &GuessSettings,
+    ) -> Result<Self, MeshGarmentError> {
+        let found = guess(&embedded::template(), garment, stated, settings)?;
+        let (template, frame) = (found.template, found.frame);
         let stature = template.mesh().bounds().map_or(0.0, |(lo, hi)| hi.y - lo.y);
         let description = format!(
-            "a guess: our body, {:.0} cm tall, its floor {:.0} cm below the file's zero",
+            "a guess: our body, {:.0} cm tall, its floor {:.0} cm below the file's zero; the file is {}",
             stature * 100.0,
-            frame.shift.y * 100.0
+            frame.shift.y * 100.0,
+            found.axes
         );
         Ok(Self {
             template,
@@ -127,6 +123,53 @@ impl SourceBody {
             is_known: false,
             description,
         })
+    }
+    /// The person that a mesh shows, in the unit and axes of its file; `None` if it shows none.
+    ///
+    /// # Errors
+    /// A mesh at fault.
+    pub(super) fn of_avatar(
+        mesh: &TriMesh,
+        stated: &MeshFrame,
+        settings: &AvatarSettings,
+    ) -> Result<Option<Self>, MeshGarmentError> {
+        let guess_settings = GuessSettings::default();
+        let Ok(found) = guess(
+            &embedded::template(),
+            mesh.vertices(),
+            stated,
+            &guess_settings,
+        ) else {
+            return Ok(None);
+        };
+        let skin = largest_component(mesh).map_err(BodyError::Mesh)?;
+        let skin = framed(&skin, found.frame, false).map_err(BodyError::Mesh)?;
+        let rigged = rig_standing(skin).ok();
+        let Some((template, fit)) = rigged.filter(|(_, fit)| *fit < settings.residual) else {
+            return Ok(None);
+        };
+        Ok(Some(Self {
+            template: Arc::new(template),
+            file: mesh.vertices().to_vec(),
+            frame: found.frame,
+            is_known: true,
+            description: format!(
+                "the person in the file ({}), skeleton found within {:.0} mm",
+                found.axes,
+                fit * 1e3
+            ),
+        }))
+    }
+    /// True for points of the file that lie at or below the skin, such as eyes.
+    pub(super) fn is_part_of_skin(&self, points: &[P3], settings: &AvatarSettings) -> bool {
+        let body = self.template.mesh().vertices();
+        let skin = SkinSearch::new(&self.template, body, 0.0);
+        let is_at_skin = |p: &&P3| {
+            let p = self.frame.to_metres(p);
+            let near = skin.nearest(&p, &V3::zeros(), 1.0);
+            near.is_some_and(|(v, _)| skin.height(&p, v) < settings.skin)
+        };
+        2 * points.iter().filter(is_at_skin).count() > points.len()
     }
     /// A body in its rest pose: a template that stands upright, y up, metres.
     pub fn of_template(template: Arc<Template>) -> Self {
@@ -138,10 +181,38 @@ impl SourceBody {
             template,
         }
     }
-    /// The same body under a garment whose file has a unit and place of its own.
-    pub(super) fn under(self, garment: &[P3], settings: &GuessSettings) -> Self {
-        let frame = locate(&self.template, garment, settings);
-        Self { frame, ..self }
+    /// The same body under a garment whose file has a unit, axes and place of its own.
+    ///
+    /// # Errors
+    /// As [`Self::guess`].
+    pub(super) fn under(
+        self,
+        garment: &[P3],
+        stated: &MeshFrame,
+        settings: &GuessSettings,
+    ) -> Result<Self, MeshGarmentError> {
+        let (frame, axes) = locate(&self.template, garment, stated, settings)?;
+        let description = format!("{}; the garment's file is {axes}", self.description);
+        Ok(Self {
+            frame,
+            description,
+            ..self
+        })
+    }
+    /// The same body under a garment that is made in the body's frame, unless it lies over the body in another one only.
+    ///
+    /// # Errors
+    /// As [`Self::guess`].
+    pub(super) fn wearing(
+        self,
+        garment: &[P3],
+        stated: &MeshFrame,
+        settings: &GuessSettings,
+    ) -> Result<Self, MeshGarmentError> {
+        if *stated == MeshFrame::default() && fits(&self.template, garment, self.frame, settings) {
+            return Ok(self);
+        }
+        self.under(garment, stated, settings)
     }
     /// Metres in a unit of the file.
     pub(super) fn unit(&self) -> f32 {
@@ -151,6 +222,16 @@ impl SourceBody {
     pub(super) fn to_metres(&self, p: &[P3]) -> Vec<P3> {
         p.iter().map(|p| self.frame.to_metres(p)).collect()
     }
+}
+
+/// A mesh in metres, y up, facing +z, its faces turned over if they look inwards.
+fn framed(mesh: &TriMesh, frame: FileFrame, is_inside_out: bool) -> Result<TriMesh, MeshError> {
+    let vertices = mesh.vertices().iter().map(|p| frame.to_metres(p)).collect();
+    let faces = mesh.faces().iter().map(|f| match is_inside_out {
+        true => [f[0], f[2], f[1]],
+        false => *f,
+    });
+    TriMesh::new(vertices, faces.collect())
 }
 
 fn largest_component(mesh: &TriMesh) -> Result<TriMesh, MeshError> {

@@ -98,15 +98,18 @@ pub fn suggest(garment: &str, body: &Measurements) -> Result<Suggestion, Garment
     first_with_ease(&sizes, body).ok_or_else(|| GarmentError::UnknownSize(garment.to_owned()))
 }
 
-/// The first of some sizes, smallest first, with enough ease everywhere; the last when none has, `None` without sizes.
+/// The first of some sizes, smallest first, with enough ease everywhere that can be worn; when none has, the last that can
+/// be worn, or the last. `None` without sizes.
 pub(super) fn first_with_ease(
     sizes: &[FinishedGarment],
     body: &Measurements,
 ) -> Option<Suggestion> {
-    let is_worn = |s: &Suggestion| s.girths.iter().all(|r| r.fit != FitClass::Tight);
-    let mut assessed = sizes.iter().map(|g| assess(g, body));
-    assessed.find(is_worn).or_else(|| {
-        let mut last = assess(sizes.last()?, body);
+    let mut wearable = sizes.iter().filter(|g| misfit(g, body).is_none());
+    let has_ease = |s: &Suggestion| s.girths.iter().all(|r| r.fit != FitClass::Tight);
+    let eased = wearable.clone().map(|g| assess(g, body)).find(has_ease);
+    eased.or_else(|| {
+        let largest = wearable.next_back().or(sizes.last())?;
+        let mut last = assess(largest, body);
         last.reason.push_str(" (our largest; it will be tight)");
         Some(last)
     })

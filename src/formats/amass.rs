@@ -79,6 +79,7 @@ pub(super) fn read_amass(path: &Path) -> Result<MotionClip, FormatError> {
         names,
         parents,
         period: 1.0 / rate,
+        is_y_up: true,
         notes: vec![format!(
             "rotations of SMPL's joints on a figure of {STATURE} m: z up turned to y up, fingers and face left out"
         )],

@@ -365,6 +365,7 @@ fn parse_asf_amc(
         rest: rest.positions(&s, &leaves),
         frames,
         period: CMU_PERIOD,
+        is_y_up: false,
         notes: vec!["AMC states no frame rate: 120 a second, as the CMU database".into()],
     })
 }

@@ -47,6 +47,10 @@ impl MeshAxis {
     const fn new(index: usize, is_negative: bool) -> Self {
         Self { index, is_negative }
     }
+    /// The axis that points the other way.
+    pub const fn opposite(self) -> Self {
+        Self::new(self.index, !self.is_negative)
+    }
     /// Unit vector.
     pub fn vector(self) -> [f64; 3] {
         let mut out = [0.0; 3];

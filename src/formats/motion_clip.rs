@@ -15,6 +15,8 @@ pub struct MotionClip {
     pub frames: Vec<Vec<P3d>>,
     /// Frame period, seconds.
     pub period: f64,
+    /// The format says that y is up; else the people in it show it.
+    pub is_y_up: bool,
     /// Statements about what was assumed or is unusual, one a sentence.
     pub notes: Vec<String>,
 }

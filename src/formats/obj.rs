@@ -1,8 +1,10 @@
-//! Wavefront OBJ: positions, texture coordinates, polygons. Materials and groups are ignored.
+//! Wavefront OBJ: positions, texture coordinates, polygons, names of objects, groups and materials.
 
 use super::FormatError;
+use super::face_origins::FaceOrigins;
 use super::image::read_limited;
-use super::obj_records::{ObjFaults, parse_records};
+use super::obj_parser::{ObjFaults, parse_records};
+use super::text_encoding::decode_text;
 use std::fmt::Write as _;
 use std::path::Path;
 use tryon_geometry::math::P3;
@@ -14,12 +16,26 @@ const MAX_BYTES: u64 = 512 << 20;
 /// Mesh of an OBJ file: corners index positions and texture coordinates separately.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ObjMesh {
-    /// Positions and triangles (polygons are fanned), checked.
+    /// Positions and triangles, checked.
     pub mesh: TriMesh,
     /// Texture coordinates, in the order of the file.
     pub uv: Vec<[f32; 2]>,
     /// Texture coordinate of each corner, shape `[faces]`; empty if a corner has none.
     pub face_uv: Vec<Face>,
+    /// Part and line of each face; empty for a mesh of no file.
+    pub origins: FaceOrigins,
+    /// Changes and elements left out, for people.
+    pub notes: Vec<String>,
+}
+
+impl From<TriMesh> for ObjMesh {
+    /// Mesh without texture coordinates and without a file.
+    fn from(mesh: TriMesh) -> Self {
+        Self {
+            mesh,
+            ..Self::default()
+        }
+    }
 }
 
 impl ObjMesh {
@@ -53,16 +69,14 @@ impl ObjMesh {
     }
 }
 
-/// Reads an OBJ file.
+/// Reads an OBJ file in UTF-8 or UTF-16. Corners that repeat their neighbour and faces of fewer than three corners that are
+/// left then are dropped, which a note says.
 ///
 /// # Errors
-/// Names the line and its fault: a malformed number, an index out of range, a polygon with fewer than three corners or
-/// a repeated one.
+/// Names the line and its fault: a malformed number, an index out of range, a polygon with fewer than three corners; or the
+/// text without vertices or faces.
 pub fn read_obj(path: &Path) -> Result<ObjMesh, FormatError> {
-    let bytes = read_limited(path, MAX_BYTES)?;
-    let text = String::from_utf8(bytes);
-    let text = text.map_err(|_| FormatError::field(path, "text", "it is not UTF-8"))?;
-    parse_obj(&text, path)
+    parse_obj(&decode_text(&read_limited(path, MAX_BYTES)?), path)
 }
 
 /// Parses OBJ text; `origin` is named in errors.
@@ -71,6 +85,9 @@ pub fn read_obj(path: &Path) -> Result<ObjMesh, FormatError> {
 /// As [`read_obj`].
 pub fn parse_obj(text: &str, origin: &Path) -> Result<ObjMesh, FormatError> {
     let records = parse_records(text, origin, ObjFaults::Refused)?;
+    if records.vertices.is_empty() || records.faces.is_empty() {
+        return Err(FormatError::field(origin, "mesh", records.found()));
+    }
     let face_uv: Option<Vec<Face>> = records.face_uv.into_iter().collect();
     let mesh = TriMesh::new(records.vertices, records.faces)
         .map_err(|e| FormatError::field(origin, "mesh", e.to_string()))?;
@@ -78,6 +95,8 @@ pub fn parse_obj(text: &str, origin: &Path) -> Result<ObjMesh, FormatError> {
         mesh,
         uv: records.uv,
         face_uv: face_uv.unwrap_or_default(),
+        origins: records.origins,
+        notes: records.notes,
     })
 }
 
@@ -120,10 +139,12 @@ mod tests {
     const QUAD: &str = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n";
 
     #[test]
-    fn polygons_are_fanned_and_negative_indices_count_back() {
+    fn negative_indices_count_back_and_positive_ones_may_name_later_lines() {
         let m = parse(&format!("{QUAD}f 1 2 3 4\nf -4 -3 -2")).expect("valid");
         assert_eq!(m.mesh.faces(), [[0, 1, 2], [0, 2, 3], [0, 1, 2]]);
         assert!(m.face_uv.is_empty());
+        let m = parse(&format!("f 1 2 3\n{QUAD}")).expect("valid");
+        assert_eq!(m.mesh.faces(), [[0, 1, 2]]);
     }
 
     #[test]
@@ -161,11 +182,69 @@ mod tests {
                 .expect_err("zero")
                 .contains("index 0")
         );
+        let e = parse("v 0,5 1 2").expect_err("comma");
+        assert!(e.contains("decimal point"), "{e}");
+    }
+
+    #[test]
+    fn repeated_corners_are_dropped_and_said() {
+        let m = parse(&format!(
+            "{QUAD}f 1 2 2\nf 1 2 2 3\nf 4 1 2 3 4\nf 1 2 1 2\nf 1 2 3"
+        ))
+        .expect("valid");
+        assert_eq!(m.mesh.faces().len(), 1 + 2 + 1);
+        assert_eq!(m.notes.len(), 2, "{:?}", m.notes);
         assert!(
-            parse(&format!("{QUAD}f 1 2 2"))
-                .expect_err("twice")
-                .contains("twice")
+            m.notes[0].contains("2 faces") && m.notes[0].contains("lines 6, 7"),
+            "{:?}",
+            m.notes
         );
+        assert!(
+            m.notes[1].contains("2 faces") && m.notes[1].contains("lines 5, 8"),
+            "{:?}",
+            m.notes
+        );
+    }
+
+    #[test]
+    fn text_without_a_mesh_says_what_it_has() {
+        for (text, words) in [
+            (
+                "solid a\nfacet normal 0 0 1\n",
+                "0 vertices (`v`) and 0 faces (`f`) in 2 lines; they begin with `facet` (1), `solid` (1)",
+            ),
+            (
+                QUAD,
+                "4 vertices (`v`) and 0 faces (`f`) in 4 lines; they begin with `v` (4)",
+            ),
+            ("", "all are empty"),
+        ] {
+            let e = parse(text).expect_err("no mesh");
+            assert!(e.contains(words), "{e}");
+        }
+    }
+
+    #[test]
+    fn faces_know_their_part_and_line() {
+        let text = format!(
+            "o Shirt\n{QUAD}g body\nusemtl red\nf 1 2 3 \\\n 4\ng sleeve\nf 1 2 3\nl 1 2\n"
+        );
+        let m = parse(&text).expect("valid");
+        let counts: Vec<(String, usize)> = m
+            .origins
+            .counts()
+            .into_iter()
+            .map(|(p, n)| (p.to_string(), n))
+            .collect();
+        assert_eq!(
+            counts,
+            [
+                ("Shirt / body / red".into(), 2),
+                ("Shirt / sleeve / red".into(), 1)
+            ]
+        );
+        assert_eq!(m.origins.place(2), "line 11 of `Shirt / sleeve / red`");
+        assert!(m.notes[0].contains("1 `l`"), "{:?}", m.notes);
     }
 
     #[test]

@@ -4,6 +4,8 @@
 use super::FormatError;
 use super::image::read_limited;
 use super::obj::{ObjMesh, parse_obj};
+use super::obj_text::lines;
+use super::text_encoding::decode_text;
 use std::path::Path;
 
 /// Largest file, bytes; the shared dress of 15,656 vertices has 2.5 MB.
@@ -34,10 +36,7 @@ pub struct SewnObj {
 /// # Errors
 /// As [`parse_sewn_obj`], or when the file cannot be read.
 pub fn read_sewn_obj(path: &Path) -> Result<SewnObj, FormatError> {
-    parse_sewn_obj(
-        &String::from_utf8_lossy(&read_limited(path, MAX_BYTES)?),
-        path,
-    )
+    parse_sewn_obj(&decode_text(&read_limited(path, MAX_BYTES)?), path)
 }
 
 /// Parses OBJ text with its stitches; `origin` is named in errors.
@@ -48,12 +47,9 @@ pub fn parse_sewn_obj(text: &str, origin: &Path) -> Result<SewnObj, FormatError>
     let obj = parse_obj(text, origin)?;
     let n = obj.mesh.vertices().len();
     let mut stitches = Vec::new();
-    for (number, line) in text
-        .lines()
-        .enumerate()
-        .filter(|(_, l)| l.starts_with("stitch"))
-    {
-        let name = format!("line {}: stitch {}", number + 1, stitches.len());
+    let is_stitch = |line: &str| line.split_whitespace().next() == Some("stitch");
+    for (number, line) in lines(text).filter(|(_, line)| is_stitch(line)) {
+        let name = format!("line {number}: stitch {}", stitches.len());
         let at = |why: String| FormatError::field(origin, name.clone(), why);
         let words: Vec<&str> = line.split_whitespace().skip(1).collect();
         let [v, a, b, t] = words.as_slice() else {

@@ -41,5 +41,6 @@ mod tests {
         ] {
             assert_eq!(decode_text(&bytes), text);
         }
+        assert_eq!(decode_text(b"o Kost\xfcm"), "o Kost\u{fffd}m");
     }
 }

@@ -15,7 +15,7 @@
 //! - Spin barrier: [`mod@par::lockstep`].
 //! - Edges, neighbours, boundaries: [`mod@mesh::topology`], of any faces [`mod@mesh::edges`].
 //! - Disjoint sets: [`mod@mesh::union_find`].
-//! - Remeshing: [`mod@mesh::remesh`].
+//! - Remeshing: [`mod@mesh::remesh`]; repair to oriented manifold sheets: [`mod@mesh::repair`].
 //! - Sparse Cholesky, conjugate gradients: [`mod@linear::cholesky`], [`mod@linear::conjugate_gradient`].
 //! - Refit BVH, inside tests: [`mod@spatial::bvh`]; closest points from the last ones: [`mod@spatial::warm_query`].
 //! - Self-intersections: [`mod@spatial::intersections`].

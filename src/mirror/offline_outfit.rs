@@ -221,7 +221,7 @@ impl OfflineOutfit {
         JoinedSurfaces(&mesh)
             .repair(par, x)
             .map_err(|fault| match fault {
-                OfflineError::IntersectingStart { crossings } => MirrorError::TangledStart {
+                OfflineError::IntersectingStart { crossings, .. } => MirrorError::TangledStart {
                     found: crossings.len(),
                     places: places(garments, &mesh, &crossings, x),
                 },

@@ -91,7 +91,7 @@ fn upright(mut clip: MotionClip, joints: &HumanJoints) -> (MotionClip, Option<St
     let Some((up, cosine)) = MeshAxis::nearest(mean.into()) else {
         return (clip, None);
     };
-    if up == MeshAxis::Y {
+    if up == MeshAxis::Y || clip.is_y_up {
         return (clip, None);
     }
     if cosine * mean.norm() < STANDING {
@@ -107,7 +107,9 @@ fn upright(mut clip: MotionClip, joints: &HumanJoints) -> (MotionClip, Option<St
     places.for_each(|p| *p = turn * *p);
     (
         clip,
-        Some(format!("{up} up in most frames: turned to y up")),
+        Some(format!(
+            "{up} up in most frames: turned to y up, as a person who lies throughout would be"
+        )),
     )
 }
 

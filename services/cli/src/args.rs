@@ -4,6 +4,7 @@ mod camera;
 mod clothcap;
 mod fine;
 mod identity;
+mod mesh_frame;
 mod offline;
 mod serve;
 mod token;
@@ -18,6 +19,7 @@ pub(crate) use clothcap::{
 };
 pub(crate) use fine::FineSessionArgs;
 pub(crate) use identity::{IdentityArgs, IdentityIssueArgs, IdentityMakeArgs, IdentityWhat};
+pub(crate) use mesh_frame::MeshFrameArgs;
 pub(crate) use offline::{FineArgs, SolverArgs};
 pub(crate) use serve::{DemoArgs, UpArgs};
 pub(crate) use token::{
@@ -106,6 +108,8 @@ pub(crate) struct RunArgs {
     /// its base mesh with the helpers). Without it the garment's own place and size are guessed from.
     #[arg(long, value_name = "NPZ|OBJ")]
     pub(crate) garment_body: Option<PathBuf>,
+    #[command(flatten)]
+    pub(crate) frame: MeshFrameArgs,
     /// Fabric of all garments instead of their own: a preset's name, a file measured as by Wang et al. 2011, or a material.
     #[arg(long, value_name = "NAME|FILE")]
     pub(crate) fabric: Option<String>,
@@ -146,6 +150,7 @@ impl RunArgs {
         GivenChoice {
             size: self.size.as_deref(),
             body: self.garment_body.as_deref(),
+            frame: self.frame.stated(),
             fabric: self.fabric.as_deref(),
         }
     }
@@ -234,6 +239,8 @@ pub(crate) struct ImportArgs {
     pub(crate) input: PathBuf,
     #[command(flatten)]
     pub(crate) recording: RecordingArgs,
+    #[command(flatten)]
+    pub(crate) frame: MeshFrameArgs,
     /// Checked copy to write (.obj or .glb for bodies and garments, .json for patterns, .mcap or a folder for
     /// recordings).
     #[arg(long, value_name = "FILE")]

@@ -7,7 +7,9 @@ use std::path::Path;
 use std::sync::Arc;
 use std::time::Duration;
 use tryon::body::{Template, embedded, import::read_body};
-use tryon::dressing::{MeshGarment, MeshGarmentSettings, SourceBody};
+use tryon::dressing::{
+    GarmentFile, MeshGarment, MeshGarmentError, MeshGarmentSettings, SourceBody,
+};
 use tryon::formats::MeshFrame;
 use tryon::formats::fabric_json::parse_fabric;
 use tryon::formats::garmentcode::{is_garmentcode, parse_garmentcode};
@@ -63,6 +65,14 @@ pub(crate) fn choices(names: &[String], given: &GivenChoice<'_>) -> Result<Vec<C
     let own = given.fabric.map(fabric).transpose()?.map(|f| f.material);
     let cotton = Material::preset("cotton")?;
     let material = own.as_ref().unwrap_or(&cotton);
+    for file in names.iter().map(Path::new) {
+        let is_file = is_mesh(file) || file.extension().is_some_and(|e| e == "json");
+        ensure!(
+            !is_file || file.exists(),
+            "{}: no such garment file",
+            file.display()
+        );
+    }
     let body = (given.body)
         .map(SourceBody::read)
         .transpose()
@@ -77,7 +87,7 @@ pub(crate) fn choices(names: &[String], given: &GivenChoice<'_>) -> Result<Vec<C
             chosen.push(Choice::Pattern(Box::new(pattern(path)?)));
         } else if is_mesh(path) {
             chosen.push(Choice::mesh(
-                mesh_garment(path, body.clone(), material)?,
+                mesh_garment(path, body.clone(), given.frame, material)?,
                 size,
             ));
         } else {
@@ -97,6 +107,8 @@ pub(crate) struct GivenChoice<'a> {
     pub(crate) size: Option<&'a str>,
     /// Body under the mesh files.
     pub(crate) body: Option<&'a Path>,
+    /// Unit and axes of the mesh files.
+    pub(crate) frame: MeshFrame,
     /// Fabric: a preset's name or a file.
     pub(crate) fabric: Option<&'a str>,
 }
@@ -172,10 +184,18 @@ fn is_mesh(path: &Path) -> bool {
 }
 
 /// Mesh garment of `material`, made on `body`, which is guessed when absent.
-fn mesh_garment(path: &Path, body: Option<SourceBody>, material: &Material) -> Result<MeshGarment> {
+pub(crate) fn mesh_garment(
+    path: &Path,
+    body: Option<SourceBody>,
+    frame: MeshFrame,
+    material: &Material,
+) -> Result<MeshGarment> {
     let settings = MeshGarmentSettings::with_edge(Triangulation::default().edge_length);
-    MeshGarment::read_on(path, body, material, &settings)
-        .with_context(|| path.display().to_string())
+    let file = GarmentFile { path, body, frame };
+    MeshGarment::read_on(file, material, &settings).map_err(|e| match e {
+        MeshGarmentError::Format(names_file) => names_file.into(),
+        other => anyhow::Error::new(other).context(path.display().to_string()),
+    })
 }
 
 /// Rough start in the camera frame, part of recordings with ground truth.

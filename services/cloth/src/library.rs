@@ -6,7 +6,7 @@ use std::path::Path;
 use std::sync::Arc;
 use tryon::body::embedded;
 use tryon::clothcap::segment::Slot;
-use tryon::dressing::{MeshGarment, MeshGarmentSettings, SourceBody};
+use tryon::dressing::{GarmentFile, MeshGarment, MeshGarmentSettings, SourceBody};
 use tryon::garment::{GarmentKind, Material, Size, Triangulation, library};
 use tryon::mirror::{CapturedWardrobe, Choice};
 use tryon_kit::config::ClothConfig;
@@ -149,7 +149,8 @@ impl Library {
     ) -> Result<String, String> {
         self.check_name(name)?;
         let settings = MeshGarmentSettings::with_edge(Triangulation::default().edge_length);
-        let garment = MeshGarment::read_on(file, body, material, &settings)
+        let file = GarmentFile::new(file, body);
+        let garment = MeshGarment::read_on(file, material, &settings)
             .map_err(|e| e.to_string())?
             .named(name);
         let category = if garment.layer() > 0 { "top" } else { "bottom" };

@@ -17,10 +17,12 @@ pub enum OfflineError {
         why: String,
     },
     /// A start whose cloth passes through itself or the obstacle.
-    #[error("{} edges pass through faces at the start, first {:?}", .crossings.len(), .crossings.first())]
+    #[error("{} edges pass through faces at the start, the first {place}: draw the surfaces apart", .crossings.len())]
     IntersectingStart {
         /// Edges and the faces that they pass through, by their numbers in the contact mesh.
         crossings: Vec<EdgeFace>,
+        /// Vertices and place of the first, in words.
+        place: String,
     },
     /// A step that was not solved at the smallest length.
     #[error("no solution at {time:.6} s with the smallest step of {step:.3e} s: {why}")]

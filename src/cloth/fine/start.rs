@@ -33,6 +33,24 @@ impl JoinedSurfaces<'_> {
         BroadPhase::default().intersections(self.0, x, par)
     }
 
+    /// The fault of a start with crossings.
+    pub(super) fn intersecting(&self, crossings: Vec<EdgeFace>, x: &[V3d]) -> OfflineError {
+        let place = crossings.first().map(|first| {
+            let edge = self.0.edges()[first.edge as usize];
+            let face = self.0.faces()[first.face as usize];
+            let middle = (x[edge[0] as usize] + x[edge[1] as usize]) * 0.5;
+            let ([a, b], [c, d, e]) = (edge, face);
+            format!(
+                "of vertices {a} and {b} through face ({c}, {d}, {e}) at ({:.3}, {:.3}, {:.3}) m",
+                middle.x, middle.y, middle.z
+            )
+        });
+        OfflineError::IntersectingStart {
+            crossings,
+            place: place.unwrap_or_default(),
+        }
+    }
+
     /// Moves `x` out of small intersections.
     ///
     /// # Errors
@@ -53,7 +71,7 @@ impl JoinedSurfaces<'_> {
         }
         if !is_free || report.moved.iter().any(|m| *m > settings.largest) {
             x.copy_from_slice(&begin);
-            return Err(OfflineError::IntersectingStart { crossings: first });
+            return Err(self.intersecting(first, x));
         }
         Ok(report)
     }
@@ -191,7 +209,10 @@ mod tests {
         let before = x.clone();
         let found = all.crossings(Par::Seq, &x);
         match all.repair(Par::Seq, &mut x) {
-            Err(OfflineError::IntersectingStart { crossings }) => assert_eq!(crossings, found),
+            Err(OfflineError::IntersectingStart { crossings, place }) => {
+                assert!(place.contains("through face ("), "{place}");
+                assert_eq!(crossings, found);
+            }
             other => panic!("{other:?}"),
         }
         assert_eq!(x, before);

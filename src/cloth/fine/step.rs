@@ -89,9 +89,10 @@ impl<'a> OfflineSolver<'a> {
             faces: obstacle,
         })?;
         if settings.contact.is_some() {
-            let crossings = JoinedSurfaces(&mesh).crossings(par, &state.unknowns());
+            let (all, x) = (JoinedSurfaces(&mesh), state.unknowns());
+            let crossings = all.crossings(par, &x);
             if !crossings.is_empty() {
-                return Err(OfflineError::IntersectingStart { crossings });
+                return Err(all.intersecting(crossings, &x));
             }
         }
         let places = state.now.x.iter().chain(&state.obstacle[1]);

@@ -17,7 +17,8 @@ type SampledMotion = Vec<(f64, Isometry3<f64>)>;
 pub(super) struct ColliderFile {
     #[serde(rename = "type")]
     kind: String,
-    radius: f64,
+    #[serde(default)]
+    radius: Option<f64>,
     #[serde(default)]
     half_segment: f64,
     #[serde(default)]
@@ -45,25 +46,29 @@ impl ColliderFile {
         })
     }
     fn shape(&self) -> Result<Primitive, String> {
-        if !(self.radius > 0.0 && self.radius.is_finite()) {
-            return Err(format!("radius: {} is no positive length", self.radius));
-        }
         if !(self.friction >= 0.0 && self.friction.is_finite()) {
             return Err(format!("friction: {} is no coefficient", self.friction));
         }
         match self.kind.as_str() {
             "sphere" => Ok(Primitive::Sphere {
-                radius: self.radius,
+                radius: self.radius()?,
             }),
             "capsule" if self.half_segment >= 0.0 => Ok(Primitive::Capsule {
-                radius: self.radius,
+                radius: self.radius()?,
                 half_segment: self.half_segment,
             }),
             "capsule" => Err(format!("half_segment: {} is negative", self.half_segment)),
             other => Err(format!(
-                "type: `{other}` is not known; there are sphere and capsule"
+                "type: `{other}` is not known; there are sphere and capsule (a floor is a sphere of a large radius)"
             )),
         }
+    }
+    fn radius(&self) -> Result<f64, String> {
+        let radius = self.radius.ok_or("radius: missing; metres")?;
+        if !(radius > 0.0 && radius.is_finite()) {
+            return Err(format!("radius: {radius} is no positive length"));
+        }
+        Ok(radius)
     }
     fn placements(&self, folder: Option<&Path>) -> Result<SampledMotion, String> {
         let name = self.motion_csv.as_deref();

@@ -1,5 +1,6 @@
 //! Classification of a piece of a mesh garment by the skin it lies over.
 
+use super::wrap::wrap;
 use crate::file_frame::bounds;
 use crate::settings::ClassifierSettings;
 use tryon_body::parts::vertex_masks;
@@ -32,6 +33,8 @@ pub(super) struct PieceShape {
     pub(super) openings: Vec<Vec<u32>>,
     /// It ends in a leg on either side.
     pub(super) has_legs: bool,
+    /// Largest share of the way that it goes around a part of the body.
+    pub(super) wrap: f64,
 }
 
 /// The body that pieces are classified on.
@@ -120,6 +123,7 @@ impl<'a> PieceClassifier<'a> {
             _ => GarmentKind::Top,
         };
         PieceShape {
+            wrap: wrap(self.template, &self.parts, x, &parts),
             kind,
             support,
             parts,

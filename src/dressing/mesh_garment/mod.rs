@@ -1,6 +1,7 @@
 //! Garments made elsewhere as meshes: their pieces of cloth, how each is held, and the body that they were made on.
 
 mod anchors;
+mod avatar;
 pub(crate) mod classifier;
 pub(crate) mod grading;
 mod layers;
@@ -10,5 +11,6 @@ mod read;
 pub(crate) mod sizing;
 mod skin_lift;
 mod surface;
+mod wrap;
 
-pub use read::MeshGarment;
+pub use read::{GarmentFile, MeshGarment};

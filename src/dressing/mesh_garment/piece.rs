@@ -28,6 +28,8 @@ pub(super) struct GarmentPiece {
     pub(super) positions: Vec<P3>,
     pub(super) binding: SkinBinding,
     rest: RestShape,
+    /// Largest share of the way that it goes around a part of the source body.
+    pub(super) wrap: f64,
 }
 
 /// Origin of a piece's rest shape on another body.
@@ -98,6 +100,7 @@ impl PieceBuilder<'_> {
             garment,
             positions: x,
             binding,
+            wrap: shape.wrap,
             rest: if made.flat {
                 RestShape::Scaled
             } else {
@@ -134,6 +137,7 @@ impl PieceBuilder<'_> {
             binding: SkinBinding::new(self.classifier.template, &positions, |_| Vec::new()),
             positions,
             rest: RestShape::Fitted,
+            wrap: 0.0,
         }))
     }
     /// A mesh without flat panels gets even triangles.
@@ -143,11 +147,7 @@ impl PieceBuilder<'_> {
             return sewn;
         }
         SewnObj {
-            obj: ObjMesh {
-                mesh: remesh(&sewn.obj.mesh, self.settings.edge),
-                uv: Vec::new(),
-                face_uv: Vec::new(),
-            },
+            obj: ObjMesh::from(remesh(&sewn.obj.mesh, self.settings.edge)),
             stitches: Vec::new(),
         }
     }
@@ -189,7 +189,8 @@ fn regions(shape: &PieceShape, topology: &Topology, x: &[P3], middle: f32) -> Ve
 }
 
 /// Several pieces as one.
-fn merge(pieces: &[SewnObj]) -> Option<SewnObj> {
+/// One surface of some; without their stitches if there are several.
+pub(super) fn merge(pieces: &[SewnObj]) -> Option<SewnObj> {
     let mut out = pieces.first()?.clone();
     let (mut vertices, mut faces) = (
         out.obj.mesh.vertices().to_vec(),
@@ -200,8 +201,11 @@ fn merge(pieces: &[SewnObj]) -> Option<SewnObj> {
         vertices.extend(p.obj.mesh.vertices());
         faces.extend(p.obj.mesh.faces().iter().map(|f| f.map(|v| v + first)));
         out.obj.face_uv.extend(&p.obj.face_uv);
+        out.obj.origins.faces.extend(&p.obj.origins.faces);
     }
-    out.stitches.clear();
+    if pieces.len() > 1 {
+        out.stitches.clear();
+    }
     out.obj.mesh = TriMesh::new(vertices, faces).ok()?;
     Some(out)
 }
@@ -317,11 +321,7 @@ mod tests {
         });
         let mesh = TriMesh::new(vertices.collect(), faces.collect()).expect("a tube");
         SewnObj {
-            obj: ObjMesh {
-                mesh,
-                uv: Vec::new(),
-                face_uv: Vec::new(),
-            },
+            obj: ObjMesh::from(mesh),
             stitches: Vec::new(),
         }
     }

@@ -1,5 +1,6 @@
 //! Reading of a mesh garment, and its pieces on another body.
 
+use super::avatar::DressedAvatar;
 use super::classifier::PieceClassifier;
 use super::layers::by_layer;
 use super::piece::{GarmentPiece, PieceBuilder};
@@ -16,12 +17,35 @@ use std::path::Path;
 use std::sync::Arc;
 use tryon_body::measure::Measurements;
 use tryon_body::{SkinSearch, Template};
+use tryon_formats::mesh_frame::MeshFrame;
 use tryon_formats::obj::ObjMesh;
 use tryon_formats::sewn_obj::SewnObj;
 use tryon_garment::import::{read_mesh, split};
 use tryon_garment::{FabricImage, GarmentError, GarmentKind, GarmentMesh, Material, Size};
 use tryon_geometry::math::P3;
 use tryon_geometry::mesh::TriMesh;
+
+/// A mesh file with a garment.
+#[derive(Clone, Debug)]
+pub struct GarmentFile<'a> {
+    /// `.obj`, `.glb`, `.gltf` or `.mhclo`.
+    pub path: &'a Path,
+    /// The body that it was made on.
+    pub body: Option<SourceBody>,
+    /// Unit and axes as far as they are stated.
+    pub frame: MeshFrame,
+}
+
+impl<'a> GarmentFile<'a> {
+    /// A file of unit and axes that are to be found.
+    pub fn new(path: &'a Path, body: Option<SourceBody>) -> Self {
+        Self {
+            path,
+            body,
+            frame: MeshFrame::default(),
+        }
+    }
+}
 
 /// A garment file and the body that it was made on, ready for [`dress_all`](crate::dress_all).
 #[derive(Clone, Debug)]
@@ -48,7 +72,7 @@ pub struct MeshGarment {
 
 impl MeshGarment {
     /// Reads a garment (`.obj`, `.glb`, `.gltf`, `.mhclo`) made on `body` (see [`SourceBody::read`]); without one a guess is
-    /// made.
+    /// made. Unit and axes are found.
     ///
     /// # Errors
     /// A fault of one of the files, by its edge, face or vertex.
@@ -58,41 +82,42 @@ impl MeshGarment {
         material: &Material,
         settings: &MeshGarmentSettings,
     ) -> Result<Self, MeshGarmentError> {
-        Self::read_on(
-            path,
-            body.map(SourceBody::read).transpose()?,
-            material,
-            settings,
-        )
+        let body = body.map(SourceBody::read).transpose()?;
+        Self::read_on(GarmentFile::new(path, body), material, settings)
     }
-    /// As [`Self::read`], on a body that has been read.
+    /// As [`Self::read`], on a body that has been read, or in a frame that is stated.
     ///
     /// # Errors
     /// As [`Self::read`].
     pub fn read_on(
-        path: &Path,
-        body: Option<SourceBody>,
+        file: GarmentFile<'_>,
         material: &Material,
         settings: &MeshGarmentSettings,
     ) -> Result<Self, MeshGarmentError> {
+        let GarmentFile { path, body, frame } = file;
         let file = read_mesh(path, body.as_ref().map(|b| b.file.as_slice()))?;
-        let raw = file.sewn.obj.mesh.vertices();
+        let avatar = match &body {
+            None => DressedAvatar::find(&file.sewn, &frame, &settings.avatar)?,
+            Some(_) => None,
+        };
+        let (sewn, body, note) = match avatar {
+            Some(a) => (a.clothes, Some(a.body), Some(a.note)),
+            None => (file.sewn, body, None),
+        };
+        let raw = sewn.obj.mesh.vertices();
+        let is_avatar = note.is_some();
         let has_binding = path.extension().is_some_and(|e| e == "mhclo");
         let source = match body {
             // The body lacks the vertices that the binding names: the file's own positions, moved over its skin.
-            Some(b) if has_binding && !file.bound => b.under(raw, &settings.guess),
-            Some(b) => b,
-            None => SourceBody::guess_with(raw, &settings.guess)?,
+            Some(b) if file.bound || is_avatar => b,
+            Some(b) if has_binding => b.under(raw, &frame, &settings.guess)?,
+            Some(b) => b.wearing(raw, &frame, &settings.guess)?,
+            None => SourceBody::guess(raw, &frame, &settings.guess)?,
         };
-        let sewn = in_metres(file.sewn, &source)
-            .map_err(|why| MeshGarmentError::Piece { piece: 0, why })?;
+        let sewn =
+            in_metres(sewn, &source).map_err(|why| MeshGarmentError::Piece { piece: 0, why })?;
         let mut out = Self::build(&file.name, &sewn, source, material, settings)?;
-        if file.turned > 0 {
-            out.notes.push(format!(
-                "{} faces turned over to agree with their neighbours",
-                file.turned
-            ));
-        }
+        out.notes.extend(note.into_iter().chain(file.notes));
         Ok(out)
     }
     /// A garment over a body in its rest pose, `mesh` in the frame of the body, metres.
@@ -106,13 +131,8 @@ impl MeshGarment {
         material: &Material,
         settings: &MeshGarmentSettings,
     ) -> Result<Self, MeshGarmentError> {
-        let obj = ObjMesh {
-            mesh,
-            uv: Vec::new(),
-            face_uv: Vec::new(),
-        };
         let sewn = SewnObj {
-            obj,
+            obj: ObjMesh::from(mesh),
             stitches: Vec::new(),
         };
         Self::build(name, &sewn, body, material, settings)
@@ -269,6 +289,18 @@ fn in_metres(mut sewn: SewnObj, source: &SourceBody) -> Result<SewnObj, GarmentE
     Ok(sewn)
 }
 
+/// Checks that one sheet of cloth at the least goes around a part of the body.
+fn check_worn(cloth: &[GarmentPiece], least: f64) -> Result<(), MeshGarmentError> {
+    let most = cloth.iter().map(|p| p.wrap).fold(0.0, f64::max);
+    if cloth.is_empty() || most >= least {
+        return Ok(());
+    }
+    Err(MeshGarmentError::NotWorn {
+        most: (100.0 * most).round() as u32,
+        least: (100.0 * least).round() as u32,
+    })
+}
+
 /// Sheets of cloth in layers, over one rigid piece with all accessories.
 fn build(
     builder: &PieceBuilder<'_>,
@@ -286,6 +318,7 @@ fn build(
         notes.push(format!("piece {piece}: {note}"));
         pieces.push(p);
     }
+    check_worn(&pieces, builder.settings.classifier.wrap)?;
     let piece = pieces.len();
     pieces = by_layer(pieces);
     let made = builder

@@ -22,6 +22,8 @@ settings! {
         pub surface: GarmentSurfaceSettings = GarmentSurfaceSettings::default(),
         /// Retargeting.
         pub retarget: RetargetSettings = RetargetSettings::default(),
+        /// Person in a garment's file.
+        pub avatar: AvatarSettings = AvatarSettings::default(),
         /// Body under a garment whose file has none.
         pub guess: GuessSettings = GuessSettings::default(),
         /// Cross-sections of the source body.
@@ -48,6 +50,8 @@ settings! {
         pub near_shoulder: f32 = 0.02,
         /// Share of vertices over legs from which a garment is a dress (from the shoulders) or a skirt (from an opening).
         pub over_legs: [f64; 2] = [0.25, 0.15],
+        /// Share of the way around a part of the body from which cloth is worn: an open jacket leaves a third.
+        pub wrap: f64 = 0.55,
         /// Height of the shoulders of a skeleton without joints there, metres.
         pub default_shoulder: f32 = 1.4,
         /// Distance within which skin is searched, metres.
@@ -116,6 +120,20 @@ settings! {
         pub ratio: [f64; 2] = [0.5, 2.0],
     }
 
+    /// Settings of the person in a garment's file.
+    pub struct AvatarSettings {
+        /// Least vertices.
+        pub vertices: usize = 500,
+        /// Least extent, share of the file's.
+        pub tall: f32 = 0.8,
+        /// Diameter of its openings below which a surface counts as closed, share of its extent.
+        pub opening: f32 = 0.06,
+        /// Distance of the fitted body from it up to which it is a person, metres.
+        pub residual: f64 = 0.02,
+        /// Height over the skin up to which other parts belong to it, such as eyes, metres.
+        pub skin: f32 = 0.004,
+    }
+
     /// Settings of the guessed body.
     pub struct GuessSettings {
         /// Horizontal distance of a garment from the file's zero from which it is moved there first, metres.
@@ -136,8 +154,28 @@ settings! {
         pub floor_spread: f64 = 0.03,
         /// Mean distance that one variance of stature or floor is worth, metres; larger prefers the usual body to the better fit.
         pub prior: f32 = 0.002,
-        /// Height below which a garment has the file's zero at half the stature, metres.
-        pub underground: f32 = -0.05,
+        /// Mean cost below which a garment needs no other frame than its body's, metres.
+        pub worn: f32 = 0.06,
+        /// Variances beyond which a floor at an unusual height costs no more.
+        pub floor_cap: f64 = 25.0,
+        /// Height over the floor below which no garment hangs, metres.
+        pub underground: f64 = -0.05,
+        /// Largest extent below which a garment is a small one, metres.
+        pub smallest: f32 = 0.6,
+        /// Price of a small garment by the logarithm of its smallness, metres.
+        pub small: f32 = 0.03,
+        /// Garment vertices in the first cost of a frame.
+        pub rough_samples: usize = 120,
+        /// Step of the heights that a frame is tried at first, metres.
+        pub height_step: f64 = 0.08,
+        /// Frames that are refined.
+        pub refined: usize = 8,
+        /// Price of axes that few files have, metres.
+        pub unusual: f32 = 0.0015,
+        /// Least lead in cost over the next frame, metres: cloth worn back to front costs 3.5 mm more at the least (30 garments).
+        pub margin: f32 = 0.0015,
+        /// Mean distance of a garment from itself turned by half a turn below which its facing is of no matter, metres.
+        pub symmetric: f32 = 0.02,
         /// Scale and arms [rad below the horizontal] at the start.
         pub start: [f64; 2] = [1.0, 0.75],
         /// Limits of the scale.

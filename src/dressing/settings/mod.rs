@@ -9,8 +9,8 @@ mod sections;
 pub use drape::OutfitDrapeSettings;
 pub use fit::{FitMapSettings, WornSizeSettings};
 pub use mesh_garment::{
-    AnchorSettings, ClassifierSettings, GarmentSurfaceSettings, GuessSettings, LiftSettings,
-    MeshGarmentSettings, PieceSettings, RetargetSettings,
+    AnchorSettings, AvatarSettings, ClassifierSettings, GarmentSurfaceSettings, GuessSettings,
+    LiftSettings, MeshGarmentSettings, PieceSettings, RetargetSettings,
 };
 pub use place::{
     HoodPlaceSettings, LegPlaceSettings, PlaceSettings, SkirtPlaceSettings, SleevePlaceSettings,

@@ -74,6 +74,7 @@ pub(super) fn parse_bvh(text: &str, origin: &Path) -> Result<MotionClip, FormatE
         parents: joints.iter().map(|j| j.parent).collect(),
         names: joints.into_iter().map(|j| j.name).collect(),
         period,
+        is_y_up: false,
         notes,
     })
 }

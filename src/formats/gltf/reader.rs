@@ -6,6 +6,8 @@ use super::uri::MAX_BYTES;
 use crate::FormatError;
 use crate::TexturePoint;
 use crate::image::read_limited;
+use crate::obj::ObjMesh;
+use crate::{FaceOrigin, FaceOrigins, PartName};
 use ::gltf::accessor::DataType;
 use ::gltf::mesh::Mode;
 use ::gltf::{Document, Gltf, Node, Primitive, Semantic};
@@ -31,6 +33,33 @@ pub struct GltfModel {
     pub uv: Vec<[f32; 2]>,
     /// The primitives, in the order of the scene.
     pub parts: Vec<GltfPart>,
+    /// Elements left out, for people.
+    pub notes: Vec<String>,
+}
+
+impl GltfModel {
+    /// The same with corners that index texture coordinates separately, and with the part of each face.
+    pub fn into_obj(self) -> ObjMesh {
+        let face_uv = match self.uv.is_empty() {
+            true => Vec::new(),
+            false => self.mesh.faces().to_vec(),
+        };
+        let faces = (0u32..).zip(&self.parts).flat_map(|(part, p)| {
+            let origin = FaceOrigin { part, line: 0 };
+            p.faces.clone().map(move |_| origin)
+        });
+        let origins = FaceOrigins {
+            faces: faces.collect(),
+            parts: self.parts.iter().map(|p| p.names.clone()).collect(),
+        };
+        ObjMesh {
+            mesh: self.mesh,
+            uv: self.uv,
+            face_uv,
+            origins,
+            notes: self.notes,
+        }
+    }
 }
 
 /// One primitive of a model.
@@ -38,6 +67,8 @@ pub struct GltfModel {
 pub struct GltfPart {
     /// Name of its mesh.
     pub name: String,
+    /// Names of its node, mesh and material.
+    pub names: PartName,
     /// Its faces in [`GltfModel::mesh`].
     pub faces: Range<usize>,
     /// Base colour, linear RGBA.
@@ -101,7 +132,13 @@ pub fn parse_gltf(bytes: &[u8], origin: &Path) -> Result<GltfModel, FormatError>
     }
     let mesh = TriMesh::new(vertices, faces)
         .map_err(|e| FormatError::field(origin, "mesh", e.to_string()))?;
-    Ok(GltfModel { mesh, uv, parts })
+    let notes = Vec::new();
+    Ok(GltfModel {
+        mesh,
+        uv,
+        parts,
+        notes,
+    })
 }
 
 /// Reads all triangles of the default scene with the base colours of their vertices.
@@ -367,6 +404,11 @@ impl<'a> SceneReader<'a> {
         let material = p.material();
         self.parts.push(GltfPart {
             name: name.to_owned(),
+            names: PartName {
+                object: String::new(),
+                group: name.to_owned(),
+                material: material.name().unwrap_or_default().to_owned(),
+            },
             faces: first..self.faces.len(),
             color: material.pbr_metallic_roughness().base_color_factor(),
             double_sided: material.double_sided(),

@@ -2,7 +2,9 @@
 
 use crate::FormatError;
 use crate::image::read_limited;
+use crate::obj_text::lines;
 use crate::sibling::sibling;
+use crate::text_encoding::decode_text;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
@@ -30,7 +32,7 @@ pub(super) fn read_libraries(
     for path in library_paths(origin, libraries)? {
         let bytes = read_limited(&path, MAX_BYTES)
             .map_err(|e| FormatError::field(origin, "mtllib", e.to_string()))?;
-        add_library(&String::from_utf8_lossy(&bytes), &path, &mut materials)?;
+        add_library(&decode_text(&bytes), &path, &mut materials)?;
     }
     Ok(materials)
 }
@@ -64,9 +66,9 @@ fn add_library(
     materials: &mut BTreeMap<String, MtlMaterial>,
 ) -> Result<(), FormatError> {
     let mut name = String::new();
-    for (number, line) in text.lines().enumerate() {
+    for (number, line) in lines(text) {
         let line = line.trim();
-        let fault = |why: String| FormatError::field(path, format!("line {}", number + 1), why);
+        let fault = |why: String| FormatError::field(path, format!("line {number}"), why);
         let (word, rest) = line.split_once(char::is_whitespace).unwrap_or((line, ""));
         let rest = rest.trim();
         if word == "newmtl" {

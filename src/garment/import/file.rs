@@ -3,22 +3,26 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 use tryon_formats::FormatError;
-use tryon_formats::gltf::{GltfModel, read_glb};
+use tryon_formats::gltf::read_glb;
 use tryon_formats::mhclo::read_mhclo;
 use tryon_formats::obj::{ObjMesh, read_obj};
 use tryon_formats::sewn_obj::{SewnObj, Stitch, read_sewn_obj};
 use tryon_geometry::math::P3;
-use tryon_geometry::mesh::{Face, TriMesh, UnionFind, edge_faces, sides, undirected};
+use tryon_geometry::mesh::{Face, MeshError, MeshRepairSettings, TriMesh, UnionFind, repair};
 
 /// Surface of a mesh file.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MeshFile {
     /// Name of the file, or of the garment in it.
     pub name: String,
-    /// Surface in the unit and frame of the file, with consistent orientation.
+    /// Surface in the unit and frame of the file, repaired: oriented manifold sheets.
+    ///
+    /// [`ObjMesh::origins`] has the part of the file that each face belongs to; [`split`] and [`some_faces`] keep it.
     pub sewn: SewnObj,
-    /// Faces whose orientation was reversed.
-    pub turned: usize,
+    /// Findings of the reader and changes of the repair, for people.
+    pub notes: Vec<String>,
+    /// Thickness of cloth that was modelled as a closed double layer, unit of the file; it is one sheet here.
+    pub thickness: Option<f32>,
     /// Positions are on the given body: it has all vertices of MakeHuman's binding.
     pub bound: bool,
 }
@@ -27,8 +31,11 @@ pub struct MeshFile {
 /// vertices of the body that a binding names; without them, or without MakeHuman's helpers among them, the positions
 /// are those of the OBJ.
 ///
+/// The surface is repaired by [`repair`]; [`MeshFile::notes`] say what changed. Coincident vertices of panels with stitches are
+/// not joined: their seams are given.
+///
 /// # Errors
-/// Faults of the file; an edge with more than two faces or of a one-sided surface (Möbius strip), by its vertices.
+/// Faults of the file; a face of a one-sided surface (Möbius strip), by its line and part.
 pub fn read_mesh(path: &Path, base: Option<&[P3]>) -> Result<MeshFile, FormatError> {
     let stem = path
         .file_stem()
@@ -40,42 +47,14 @@ pub fn read_mesh(path: &Path, base: Option<&[P3]>) -> Result<MeshFile, FormatErr
         .and_then(|e| e.to_str())
         .unwrap_or("")
         .to_ascii_lowercase();
-    let (name, mut sewn, bound) = match extension.as_str() {
+    let (name, sewn, bound) = match extension.as_str() {
         "obj" => (stem, read_sewn_obj(path)?, false),
-        "glb" | "gltf" => (
-            stem,
-            SewnObj {
-                obj: welded(read_glb(path)?, path)?,
-                stitches: Vec::new(),
-            },
-            false,
-        ),
+        "glb" | "gltf" => (stem, unsewn(read_glb(path)?.into_obj()), false),
         "mhclo" => {
-            let m = read_mhclo(path)?;
-            let mut obj = read_obj(&path.with_file_name(&m.obj_file))?;
-            if m.bindings.len() != obj.mesh.vertices().len() {
-                let why = format!(
-                    "{} are bound, {} has {}",
-                    m.bindings.len(),
-                    m.obj_file,
-                    obj.mesh.vertices().len()
-                );
-                return Err(FormatError::field(path, "verts", why));
-            }
-            let fitted = base.and_then(|b| m.fit(b, path).ok());
-            let bound = fitted.is_some();
-            if let Some(p) = fitted {
-                obj.mesh = obj
-                    .mesh
-                    .with_vertices(p)
-                    .map_err(|e| FormatError::field(path, "verts", e.to_string()))?;
-            }
+            let (name, obj, bound) = clothes(path, base)?;
             (
-                if m.name.is_empty() { stem } else { m.name },
-                SewnObj {
-                    obj,
-                    stitches: Vec::new(),
-                },
+                if name.is_empty() { stem } else { name },
+                unsewn(obj),
                 bound,
             )
         }
@@ -84,119 +63,98 @@ pub fn read_mesh(path: &Path, base: Option<&[P3]>) -> Result<MeshFile, FormatErr
             return Err(FormatError::field(path, "name", why));
         }
     };
-    let turned = orient(&mut sewn.obj, path)?;
+    let (sewn, thickness) = repaired(sewn, path)?;
     Ok(MeshFile {
         name,
+        notes: sewn.obj.notes.clone(),
         sewn,
-        turned,
+        thickness,
         bound,
     })
 }
 
-/// Welds the vertices that glTF splits along texture seams.
-fn welded(model: GltfModel, path: &Path) -> Result<ObjMesh, FormatError> {
-    /// Largest distance of vertices that are welded, as a share of the model's size.
-    const SAME: f32 = 1e-5;
-    let size = model
-        .mesh
-        .bounds()
-        .map_or(1.0, |(lo, hi)| (hi - lo).amax())
-        .max(f32::MIN_POSITIVE);
-    let key = |p: &P3| [p.x, p.y, p.z].map(|c| (c / (SAME * size)).round() as i64);
-    let mut seen = BTreeMap::new();
-    let mut vertices = Vec::new();
-    let under: Vec<u32> = model
-        .mesh
-        .vertices()
-        .iter()
-        .map(|p| {
-            *seen.entry(key(p)).or_insert_with(|| {
-                vertices.push(*p);
-                vertices.len() as u32 - 1
-            })
-        })
-        .collect();
-    let (mut faces, mut face_uv) = (Vec::new(), Vec::new());
-    for f in model.mesh.faces() {
-        let w = f.map(|v| under[v as usize]);
-        if w[0] != w[1] && w[1] != w[2] && w[0] != w[2] {
-            faces.push(w);
-            face_uv.push(*f);
-        }
+fn unsewn(obj: ObjMesh) -> SewnObj {
+    SewnObj {
+        obj,
+        stitches: Vec::new(),
     }
-    if model.uv.is_empty() {
-        face_uv.clear();
-    }
-    let mesh = TriMesh::new(vertices, faces)
-        .map_err(|e| FormatError::field(path, "mesh", e.to_string()))?;
-    Ok(ObjMesh {
-        mesh,
-        uv: model.uv,
-        face_uv,
-    })
 }
 
-/// Reverses faces until neighbours have the same orientation; returns the number of reversed faces.
-fn orient(o: &mut ObjMesh, path: &Path) -> Result<usize, FormatError> {
-    let mut faces = o.mesh.faces().to_vec();
-    let mut around: BTreeMap<[u32; 2], Vec<u32>> = BTreeMap::new();
-    for (edge, face) in edge_faces(&faces) {
-        around.entry(edge).or_default().push(face);
+/// MakeHuman clothes: their name, the OBJ beside the binding, and true if that is fitted to `base`.
+fn clothes(path: &Path, base: Option<&[P3]>) -> Result<(String, ObjMesh, bool), FormatError> {
+    let m = read_mhclo(path)?;
+    let mut obj = read_obj(&path.with_file_name(&m.obj_file))?;
+    let (bound, has) = (m.bindings.len(), obj.mesh.vertices().len());
+    if bound != has {
+        let why = format!("{bound} are bound, {} has {has}", m.obj_file);
+        return Err(FormatError::field(path, "verts", why));
     }
-    if let Some(([a, b], f)) = around.iter().find(|(_, f)| f.len() > 2) {
-        let why = format!(
-            "{} faces meet there ({:?}); cloth has at most two",
-            f.len(),
-            f
-        );
-        return Err(FormatError::field(path, format!("edge ({a}, {b})"), why));
+    let fitted = base.and_then(|b| m.fit(b, path).ok());
+    let is_fitted = fitted.is_some();
+    if let Some(p) = fitted {
+        let moved = obj.mesh.with_vertices(p);
+        obj.mesh = moved.map_err(|e| FormatError::field(path, "verts", e.to_string()))?;
     }
-    let mut known = vec![false; faces.len()];
-    let mut turned = vec![false; faces.len()];
-    for seed in 0..faces.len() {
-        if std::mem::replace(&mut known[seed], true) {
-            continue;
+    Ok((m.name, obj, is_fitted))
+}
+
+/// Repaired surface, with what changed among its notes; and the thickness of cloth that was modelled with it.
+fn repaired(sewn: SewnObj, path: &Path) -> Result<(SewnObj, Option<f32>), FormatError> {
+    let defaults = MeshRepairSettings::default();
+    let settings = MeshRepairSettings {
+        weld: if sewn.stitches.is_empty() {
+            defaults.weld
+        } else {
+            0.0
+        },
+        ..defaults
+    };
+    let SewnObj { obj, stitches } = sewn;
+    let done = repair(&obj.mesh, &settings).map_err(|e| match e {
+        MeshError::OneSided { face } => {
+            let why = "the surface has one side only (a twisted band); cut it open there";
+            FormatError::field(path, obj.origins.place(face), why)
         }
-        let (mut piece, mut at) = (vec![seed], 0);
-        while at < piece.len() {
-            let i = piece[at];
-            at += 1;
-            let f = faces[i];
-            for side in sides(&f) {
-                for &n in &around[&undirected(side)] {
-                    let n = n as usize;
-                    // Faces of the same orientation run along their edge in opposite directions.
-                    let alike = n == i || !sides(&faces[n]).contains(&side);
-                    if known[n] && !alike {
-                        let why = "its faces cannot be turned alike: the surface has one side only"
-                            .to_owned();
-                        let [a, b] = side;
-                        return Err(FormatError::field(path, format!("edge ({a}, {b})"), why));
-                    }
-                    if !std::mem::replace(&mut known[n], true) {
-                        if !alike {
-                            faces[n].swap(1, 2);
-                            turned[n] = true;
-                        }
-                        piece.push(n);
-                    }
-                }
-            }
-        }
-        // The majority of the piece keeps its orientation.
-        if piece.iter().filter(|i| turned[**i]).count() * 2 > piece.len() {
-            for i in piece {
-                faces[i].swap(1, 2);
-                turned[i] = !turned[i];
-            }
-        }
+        e => FormatError::field(path, "mesh", e.to_string()),
+    })?;
+    let faces = done.face_source.iter().map(|f| *f as usize);
+    let corner = |c: u32| Some(obj.face_uv.get(c as usize / 3)?[c as usize % 3]);
+    let corners = done.corner_source.iter();
+    let face_uv = corners.filter_map(|c| Some([corner(c[0])?, corner(c[1])?, corner(c[2])?]));
+
+    // The first copy of a vertex keeps its stitches.
+    let mut number = vec![None; obj.mesh.vertices().len()];
+    for (new, old) in (0u32..).zip(&done.vertex_source) {
+        number[*old as usize].get_or_insert(new);
     }
-    for (f, _) in o.face_uv.iter_mut().zip(&turned).filter(|(_, t)| **t) {
-        f.swap(1, 2);
+    let stitches = moved(&stitches, |v| number[v as usize]);
+    let mut notes = obj.notes;
+    notes.extend(done.report.clauses(|face| obj.origins.place(face as usize)));
+    if let Some(thickness) = done.thickness {
+        notes.push(format!(
+            "cloth {thickness:.2e} thick, in the unit of the file, taken as one sheet"
+        ));
     }
-    o.mesh = TriMesh::new(o.mesh.vertices().to_vec(), faces)
-        .map_err(|e| FormatError::field(path, "mesh", e.to_string()))?;
-    Ok(turned.iter().filter(|t| **t).count())
+    let obj = ObjMesh {
+        face_uv: face_uv.collect(),
+        origins: obj.origins.of_faces(faces),
+        uv: obj.uv,
+        mesh: done.mesh,
+        notes,
+    };
+    Ok((SewnObj { obj, stitches }, done.thickness))
+}
+
+/// Stitches of the vertices that have a new number.
+fn moved(stitches: &[Stitch], number: impl Fn(u32) -> Option<u32>) -> Vec<Stitch> {
+    let moved = |s: &Stitch| {
+        Some(Stitch {
+            vertex: number(s.vertex)?,
+            edge: [number(s.edge[0])?, number(s.edge[1])?],
+            at: s.at,
+        })
+    };
+    stitches.iter().filter_map(moved).collect()
 }
 
 /// Pieces of cloth, connected by faces or stitches, largest first.
@@ -238,18 +196,9 @@ pub fn some_faces(sewn: &SewnObj, faces: &[usize]) -> Option<SewnObj> {
         .iter()
         .map(|i| sewn.obj.mesh.faces()[*i].map(&mut name))
         .collect();
-    let at = |v: u32| Some(label[v as usize]).filter(|l| *l != u32::MAX);
-    let stitches = sewn
-        .stitches
-        .iter()
-        .filter_map(|s| {
-            Some(Stitch {
-                vertex: at(s.vertex)?,
-                edge: [at(s.edge[0])?, at(s.edge[1])?],
-                at: s.at,
-            })
-        })
-        .collect();
+    let stitches = moved(&sewn.stitches, |v| {
+        Some(label[v as usize]).filter(|l| *l != u32::MAX)
+    });
     let face_uv = faces
         .iter()
         .filter_map(|i| sewn.obj.face_uv.get(*i).copied())
@@ -262,6 +211,8 @@ pub fn some_faces(sewn: &SewnObj, faces: &[usize]) -> Option<SewnObj> {
             mesh,
             uv: sewn.obj.uv.clone(),
             face_uv,
+            origins: sewn.obj.origins.of_faces(faces.iter().copied()),
+            notes: Vec::new(),
         },
         stitches,
     })
@@ -279,22 +230,69 @@ mod tests {
 
     const QUAD: &str = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n";
 
+    fn read(name: &str, text: &str) -> Result<MeshFile, String> {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join(name);
+        std::fs::write(&path, text).expect("written");
+        read_mesh(&path, None).map_err(|e| e.to_string())
+    }
+
     #[test]
-    fn faces_get_one_orientation_and_faults_name_their_edge() {
-        let mut o = obj(&format!("{QUAD}v 2 0 0\nf 1 2 3\nf 1 4 3\nf 2 3 5"));
-        let n = orient(&mut o, Path::new("t.obj")).expect("turned");
-        assert!(n > 0 && Topology::new(&o.mesh).is_ok());
-        let mut o = obj(&format!("{QUAD}v 2 0 0\nf 1 2 3\nf 2 1 4\nf 1 2 5"));
-        let e = orient(&mut o, Path::new("t.obj"))
-            .expect_err("three")
-            .to_string();
-        assert!(e.contains("edge (0, 1)") && e.contains("3 faces"), "{e}");
+    fn surfaces_are_repaired_and_changes_name_their_lines() {
+        let m = read(
+            "t.obj",
+            &format!("{QUAD}v 2 0 0\nv 9 9 9\nf 1 2 3\nf 1 4 3\nf 2 3 5\nf 3 1 2\n"),
+        )
+        .expect("mended");
+        assert!(Topology::new(&m.sewn.obj.mesh).is_ok());
+        assert_eq!(m.sewn.obj.mesh.faces().len(), 3);
+        let notes = m.notes.join("; ");
+        assert!(
+            notes.contains("turned over") && notes.contains("1 repeated face removed (line 10)"),
+            "{notes}"
+        );
+        assert!(notes.contains("1 vertex without a face removed"), "{notes}");
+
+        let m = read(
+            "t.obj",
+            &format!("{QUAD}v 0 0 1\no a\nf 1 2 3\nf 1 3 4\no b\nf 1 3 5"),
+        )
+        .expect("split");
+        let notes = m.notes.join("; ");
+        assert!(
+            notes.contains("1 edge with more than two faces split (line 9 of `b`)"),
+            "{notes}"
+        );
+        let parts: Vec<String> = split(&m.sewn)
+            .iter()
+            .map(|s| s.obj.origins.counts()[0].0.to_string())
+            .collect();
+        assert_eq!(parts, ["a", "b"]);
+
         // A Möbius strip of five triangles.
-        let ring = "v 0 0 0\nv 1 0 0\nv 2 0 0\nv 3 0 0\nv 4 0 0\nf 1 2 3\nf 2 3 4\nf 3 4 5\nf 4 5 1\nf 5 1 2";
-        let e = orient(&mut obj(ring), Path::new("t.obj"))
-            .expect_err("one side")
-            .to_string();
-        assert!(e.contains("one side"), "{e}");
+        let ring = "v 0 0 0\nv 1 0 0\nv 2 0 3\nv 3 4 0\nv 4 0 5\nf 1 2 3\nf 2 3 4\nf 3 4 5\nf 4 5 1\nf 5 1 2";
+        let e = read("t.obj", ring).expect_err("one side");
+        assert!(e.contains("one side") && e.contains("`line "), "{e}");
+    }
+
+    #[test]
+    fn texture_coordinates_and_stitches_follow_their_corners() {
+        let text = format!(
+            "{QUAD}vt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nf 1/1 2/2 3/3\nf 1/1 4/4 3/3\nf 2/2 3/3 1/1\n"
+        );
+        let m = read("t.obj", &text).expect("mended").sewn.obj;
+        assert_eq!(m.face_uv.len(), 2);
+        for (f, t) in m.mesh.faces().iter().zip(&m.face_uv) {
+            for (v, t) in f.iter().zip(t) {
+                let p = m.mesh.vertices()[*v as usize];
+                assert_eq!([p.x, p.y], m.uv[*t as usize]);
+            }
+        }
+        // Coincident vertices of two panels with a stitch stay apart; a stray vertex moves the numbers.
+        let sewn = "v 9 9 9\nv 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 0\nv 1 0 0\nv 0 -1 0\nf 2 3 4\nf 6 5 7\nstitch 4 1 2 0\n";
+        let m = read("t.obj", sewn).expect("sewn").sewn;
+        assert_eq!(m.obj.mesh.vertices().len(), 6);
+        assert_eq!((m.stitches[0].vertex, m.stitches[0].edge), (3, [0, 1]));
     }
 
     #[test]

@@ -1,10 +1,11 @@
-//! Triangle meshes and their topology, checked once at construction; normals, boundaries, isotropic remeshing, neighbour smoothing.
+//! Triangle meshes and their topology, checked once at construction; normals, boundaries, repair, isotropic remeshing, neighbour smoothing.
 
 mod distances;
 pub(crate) mod edges;
 mod editable;
 mod normals;
 pub(crate) mod remesh;
+pub(crate) mod repair;
 mod settings;
 pub mod smoothing;
 pub(crate) mod topology;
@@ -15,7 +16,8 @@ pub use edges::{boundary_edges, boundary_loops, edge_faces, edges, sides, undire
 pub use editable::smallest_angle;
 pub use normals::{face_normal, vertex_normal, vertex_normals};
 pub use remesh::{Border, RemeshSpec, Remesher, remesh};
-pub use settings::RemeshSettings;
+pub use repair::{FaceFinding, MeshRepairReport, RepairedMesh, repair};
+pub use settings::{MeshRepairSettings, RemeshSettings};
 pub use topology::{Csr, Edge, Topology};
 pub use union_find::UnionFind;
 
@@ -66,6 +68,12 @@ pub enum MeshError {
     /// An edge with more than two faces.
     #[error("edge ({0}, {1}) has more than two faces")]
     NonManifoldEdge(u32, u32),
+    /// A surface with one side only (Möbius strip): its faces cannot have one orientation.
+    #[error("face {face}: the surface has one side only (a twisted band); cut it open there")]
+    OneSided {
+        /// Face at which the orientation contradicts itself.
+        face: usize,
+    },
     /// Two faces traverse a shared edge in the same direction.
     #[error("edge ({0}, {1}): its two faces are oriented against each other")]
     FlippedFace(u32, u32),

@@ -1,4 +1,4 @@
-//! Settings of remeshing.
+//! Settings of remeshing and repair.
 
 use crate::settings;
 
@@ -25,5 +25,18 @@ settings! {
         pub relax_crease: f64 = 0.8,
         /// Distance from the mirror plane that an inner vertex keeps, over its target edge length.
         pub off_plane: f64 = 0.1,
+    }
+
+    /// Settings of [`repair`](crate::mesh::repair); lengths are shares of the longest side of the bounding box.
+    pub struct MeshRepairSettings {
+        /// Distance up to which vertices are joined, and height up to which a face has no area: rounding of six digits.
+        /// Zero joins none.
+        pub weld: f32 = 1e-5,
+        /// Largest thickness of a double layer, over the size of its part: 14 mm of a shirt.
+        pub layer_share: f32 = 0.02,
+        /// Least share of the area with a face of opposite normal behind it.
+        pub layer_least: f32 = 0.7,
+        /// Least ratio of the areas of the two sheets.
+        pub layer_alike: f32 = 0.75,
     }
 }

@@ -84,7 +84,7 @@ fn jaw_and_eyes_of_smplx_are_no_hands() {
         .expect("vertices");
     let far =
         (place(&body.template, "left_hand_end") - Point3::from(fingertips.map(f64::from))).norm();
-    assert!(far < 0.03, "{far} m from the fingertips");
+    assert!(far < 0.05, "{far} m from the fingertips");
 }
 
 /// A body that had 59,430 m³, z up and nameless, is one of 59 litres.

@@ -34,6 +34,7 @@ pub(crate) fn run(args: &ImportArgs) -> Result<ExitCode> {
         "glb" | "gltf" => {
             let g = read_glb(path)?;
             describe(&g.mesh)?;
+            as_garment(args)?;
             write(args, "garment", g.mesh.vertices(), g.mesh.faces(), &g.uv)?;
         }
         "json" => json(args)?,
@@ -113,6 +114,7 @@ fn obj(args: &ImportArgs) -> Result<()> {
         );
     }
     describe(&sewn.obj.mesh)?;
+    as_garment(args)?;
     let (vertices, uv, faces, _) = sewn.obj.unwelded();
     write(args, "garment", &vertices, &faces, &uv)
 }
@@ -127,6 +129,16 @@ fn describe(surface: &TriMesh) -> Result<()> {
         topology.is_closed(),
         surface.area()
     );
+    Ok(())
+}
+
+/// Findings about a mesh that is worn, or why it is not.
+fn as_garment(args: &ImportArgs) -> Result<()> {
+    let cotton = Material::preset("cotton")?;
+    match input::mesh_garment(&args.input, None, args.frame.stated(), &cotton) {
+        Ok(garment) => println!("as a garment: {}", garment.notes.join("; ")),
+        Err(e) => println!("as a garment: {e:#}"),
+    }
     Ok(())
 }
 

@@ -89,7 +89,7 @@ fn vertex_colours_of_an_obj_win() {
         "mtllib none.mtl\nv 0 0 0 1 0.5 0\nv 1 0 0 0 0 0.2\nv 0 1 0\nusemtl m\nf 1 2 3\nf 1 1 2\n";
     let scan = read_bytes(dir.path(), "a.obj", text.as_bytes()).expect("valid");
     assert_eq!(scan.colors, [[255, 128, 0], [0, 0, 51], [128, 64, 26]]);
-    assert_eq!(scan.faces.len(), 2, "a degenerate face is kept");
+    assert_eq!(scan.faces.len(), 1, "a degenerate face is left out");
     let scan = read_bytes(dir.path(), "a.obj", b"v 0 0 0 9 8 7\nv 0 0 0 200 1 1").expect("valid");
     assert_eq!(scan.colors, [[9, 8, 7], [200, 1, 1]]);
     let e = refusal(dir.path(), "a.obj", b"v 0 0 0\nf 1 1 2");

@@ -4,7 +4,7 @@ use super::Case;
 use anyhow::Result;
 use std::path::Path;
 use tryon::body::measure::Measurements;
-use tryon::dressing::{GarmentSource, MeshGarment, MeshGarmentSettings, suggest};
+use tryon::dressing::{GarmentFile, GarmentSource, MeshGarment, MeshGarmentSettings, suggest};
 use tryon::formats::garmentcode::{is_garmentcode, parse_garmentcode};
 use tryon::garment::import::from_garmentcode;
 use tryon::garment::{Material, Pattern, Size, Triangulation, library};
@@ -29,8 +29,8 @@ impl Garment {
                 .edge
                 .unwrap_or(Triangulation::default().edge_length);
             let settings = MeshGarmentSettings::with_edge(edge);
-            let source = case.source.cloned();
-            let mesh = MeshGarment::read_on(Path::new(name), source, &fabric, &settings)?;
+            let file = GarmentFile::new(Path::new(name), case.source.cloned());
+            let mesh = MeshGarment::read_on(file, &fabric, &settings)?;
             mesh.notes.iter().for_each(|n| println!("  {n}"));
             return Ok(Self::Mesh(Box::new(mesh)));
         }

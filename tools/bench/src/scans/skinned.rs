@@ -104,13 +104,8 @@ impl SkinnedGarment {
 
     fn new(name: &str, mesh: &TriMesh, source: &[P3]) -> Result<Self, String> {
         let cotton = Material::preset("cotton").map_err(|e| e.to_string())?;
-        let obj = ObjMesh {
-            mesh: mesh.clone(),
-            uv: Vec::new(),
-            face_uv: Vec::new(),
-        };
         let sewn = SewnObj {
-            obj,
+            obj: ObjMesh::from(mesh.clone()),
             stitches: Vec::new(),
         };
         let made = from_mesh(&sewn, name, GarmentKind::Top, cotton).map_err(|e| e.to_string())?;

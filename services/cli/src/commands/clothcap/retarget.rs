@@ -265,7 +265,12 @@ fn on_motion(
     }
     // The calibration pose before the clip is not part of it.
     let lead = (sequence.clip_lead() * RATE).round() as u64;
-    let pose = |i| sequence.truth(lead + i).pose.transformed(&world_from_camera);
+    let pose = |i| {
+        sequence
+            .truth(lead + i)
+            .pose
+            .transformed(&world_from_camera)
+    };
     let first = frames.displacements.into_iter().next();
     let first = first.context("the capture has no finished scan")?;
     let poses: Vec<_> = (0..count.max(1)).map(pose).collect();
