@@ -307,7 +307,7 @@ mod tests {
                 .to_string()
         };
         let poses_only = ("poses", &[2u64, 156][..], poses(156));
-        assert!(fault(&[poses_only.clone()]).contains("`trans`"));
+        assert!(fault(std::slice::from_ref(&poses_only)).contains("`trans`"));
         let e = fault(&[poses_only.clone(), ("trans", &[2, 3], trans())]);
         assert!(
             e.contains("mocap_framerate") && e.contains("mocap_frame_rate"),

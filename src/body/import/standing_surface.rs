@@ -79,7 +79,7 @@ impl StandingFrame {
         let [low, high] = range(points.iter(), up);
         let stature = f64::from(high - low);
         let unit = unit_of_stature(stature, stated.metres_per_unit)?;
-        let volume = f64::from(mesh.volume()) * unit.powi(3);
+        let volume = mesh.volume() * unit.powi(3);
         check_volume(volume.abs(), stature * unit)?;
         let mut notes = Vec::new();
         if (unit - 1.0).abs() > 1e-9 {
