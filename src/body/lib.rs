@@ -9,6 +9,7 @@
 //! - Skinning (eq. 4): [`mod@skinning`].
 //! - Lengths of bones without change of girth (eq. 18 to 20), displacements on the template: [`mod@shape`].
 //! - Parts, limbs, joint names: [`mod@parts::joints`], [`mod@parts::vertices`].
+//! - Joints of a person in any rig, by lengths: [`mod@human_joints`]; bodies of files: [`mod@import`].
 //! - The embedded figure: [`mod@embedded`], read by [`mod@template_file`].
 //! - Tape measures: [`mod@measure::tape`].
 //! - Arms turned out of the trunk, for the easy pose of the first drape: [`mod@arm_clearance`].
@@ -28,6 +29,7 @@ mod arm_clearance;
 mod decoded_glb;
 pub mod embedded;
 mod error;
+pub mod human_joints;
 pub mod import;
 pub mod measure;
 pub mod parts;

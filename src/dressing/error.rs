@@ -2,6 +2,7 @@
 
 use super::suggest::Misfit;
 use tryon_body::BodyError;
+use tryon_body::import::BodyFileError;
 use tryon_cloth::ClothError;
 use tryon_formats::FormatError;
 use tryon_garment::GarmentError;
@@ -43,6 +44,9 @@ pub enum MeshGarmentError {
     /// The body that it was made on is at fault.
     #[error(transparent)]
     Body(#[from] BodyError),
+    /// The file of the body that it was made on is at fault.
+    #[error(transparent)]
+    BodyFile(#[from] BodyFileError),
     /// The body that it was made on has no skeleton, and none was found for it.
     #[error("the body that the garment was made on: {0}")]
     NotFound(String),

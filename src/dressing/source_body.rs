@@ -7,16 +7,12 @@ use super::rig_standing::rig_standing;
 use super::settings::{AvatarSettings, GuessSettings};
 use std::path::Path;
 use std::sync::Arc;
-use tryon_body::import::template_from_smpl;
+use tryon_body::import::{StandingFrame, read_body};
 use tryon_body::{BodyError, SkinSearch, Template, embedded};
-use tryon_formats::mesh_frame::{MeshAxis, MeshFrame};
-use tryon_formats::npz::read_smpl;
+use tryon_formats::mesh_frame::MeshFrame;
 use tryon_formats::obj::read_obj;
 use tryon_geometry::math::{P3, V3};
 use tryon_geometry::mesh::{Face, MeshError, Topology, TriMesh};
-
-/// Limits of a grown body's stature, metres; they decide the file's unit.
-const STATURE: [f32; 2] = [1.1, 2.4];
 
 /// A body in the pose and place in which garments were made on it.
 #[derive(Clone, Debug)]
@@ -33,53 +29,72 @@ pub struct SourceBody {
 }
 
 impl SourceBody {
-    /// Reads a body: `.npz` in SMPL layout (its rest pose), or `.obj`: a body that stands upright with its arms away from
-    /// its sides, y or z up, in m, dm, cm or mm. An OBJ's skeleton is found by [`rig_standing`]; only its largest
-    /// component is skin.
+    /// As [`Self::read_in`], in a frame that the body itself shows.
     ///
     /// # Errors
-    /// A fault of the file, or a mesh in which no person is found.
+    /// As [`Self::read_in`].
     pub fn read(path: &Path) -> Result<Self, MeshGarmentError> {
+        Self::read_in(path, &MeshFrame::default())
+    }
+    /// Reads a body: `.npz` in SMPL layout (its rest pose), or `.obj`: a body that stands upright with its arms away from
+    /// its sides. Unit and axes are recognised from the body, or `stated`. An OBJ's skeleton is found by [`rig_standing`];
+    /// only its largest component is skin.
+    ///
+    /// # Errors
+    /// A fault of the file, a body whose frame is unclear, or a mesh in which no person is found.
+    pub fn read_in(path: &Path, stated: &MeshFrame) -> Result<Self, MeshGarmentError> {
         let name = path
             .file_name()
             .map_or_else(String::new, |n| n.to_string_lossy().into_owned());
-        if path.extension().is_some_and(|e| e == "npz") {
-            let template = template_from_smpl(&name, &read_smpl(path)?)?;
-            let file = template.mesh().vertices().to_vec();
+        let described = |notes: &[String]| match notes.is_empty() {
+            true => name.clone(),
+            false => format!("{name} ({})", notes.join("; ")),
+        };
+        if path
+            .extension()
+            .is_some_and(|e| e.eq_ignore_ascii_case("npz"))
+        {
+            let body = read_body(path, stated)?;
             return Ok(Self {
-                template: Arc::new(template),
-                file,
-                frame: FileFrame::metres(),
+                description: described(&body.notes),
+                // Garments made on it have the frame of its file.
+                file: body.file_vertices,
+                frame: FileFrame {
+                    scale: body.metres_per_unit as f32,
+                    rotation: body.matrix.cast(),
+                    shift: V3::zeros(),
+                },
+                template: Arc::new(body.template),
                 is_known: true,
-                description: name,
             });
         }
         let mesh = read_obj(path)?.mesh;
-        let unknown = |why: &str| MeshGarmentError::NotFound(format!("{}: {why}", path.display()));
-        let (lo, hi) = mesh.bounds().ok_or_else(|| unknown("it has no vertices"))?;
-        let size = hi - lo;
-        let z_up = size.z > size.y;
-        let tall = if z_up { size.z } else { size.y };
-        let scale = unit_of(tall)
-            .ok_or_else(|| unknown(&format!("{tall} high is no person in m, dm, cm or mm")))?;
-        let (up, facing) = match z_up {
-            true => (MeshAxis::Z, MeshAxis::Y.opposite()),
-            false => (MeshAxis::Y, MeshAxis::Z),
-        };
+        let unknown =
+            |why: String| MeshGarmentError::NotFound(format!("{}: {why}", path.display()));
+        let skin = largest_component(&mesh).map_err(BodyError::Mesh)?;
+        let standing = StandingFrame::find(&skin, stated).map_err(unknown)?;
         let axes = FileAxes {
-            unit: f64::from(scale),
-            up,
-            facing,
+            unit: standing.metres_per_unit,
+            up: standing.up,
+            facing: standing.facing,
         };
         let frame = axes.frame();
-        let skin = largest_component(&mesh, frame).map_err(BodyError::Mesh)?;
-        let (template, fit) = rig_standing(skin).map_err(MeshGarmentError::NotFound)?;
+        let skin = framed(&skin, frame, standing.is_inside_out).map_err(BodyError::Mesh)?;
+        let (template, fit) = rig_standing(skin).map_err(|why| {
+            unknown(format!(
+                "{why}; it was taken as {axes}: say `--up` and `--facing` if it is another way"
+            ))
+        })?;
         Ok(Self {
             template: Arc::new(template),
             file: mesh.vertices().to_vec(),
             frame,
             is_known: true,
-            description: format!("{name}, skeleton found within {:.0} mm", fit * 1e3),
+            description: format!(
+                "{}, skeleton found within {:.0} mm",
+                described(&standing.notes),
+                fit * 1e3
+            ),
         })
     }
     /// The embedded body, scaled, moved and with its arms turned so that garment vertices lie just above its skin: a
@@ -127,7 +142,8 @@ impl SourceBody {
         ) else {
             return Ok(None);
         };
-        let skin = largest_component(mesh, found.frame).map_err(BodyError::Mesh)?;
+        let skin = largest_component(mesh).map_err(BodyError::Mesh)?;
+        let skin = framed(&skin, found.frame, false).map_err(BodyError::Mesh)?;
         let rigged = rig_standing(skin).ok();
         let Some((template, fit)) = rigged.filter(|(_, fit)| *fit < settings.residual) else {
             return Ok(None);
@@ -212,13 +228,17 @@ impl SourceBody {
     }
 }
 
-/// Metres in a unit (m, dm, cm or mm) in which a body's height is a person's.
-fn unit_of(tall: f32) -> Option<f32> {
-    let mut units = [1.0f32, 0.1, 0.01, 0.001].into_iter();
-    units.find(|s| tall * s > STATURE[0] && tall * s < STATURE[1])
+/// A mesh in metres, y up, facing +z, its faces turned over if they look inwards.
+fn framed(mesh: &TriMesh, frame: FileFrame, is_inside_out: bool) -> Result<TriMesh, MeshError> {
+    let vertices = mesh.vertices().iter().map(|p| frame.to_metres(p)).collect();
+    let faces = mesh.faces().iter().map(|f| match is_inside_out {
+        true => [f[0], f[2], f[1]],
+        false => *f,
+    });
+    TriMesh::new(vertices, faces.collect())
 }
 
-fn largest_component(mesh: &TriMesh, frame: FileFrame) -> Result<TriMesh, MeshError> {
+fn largest_component(mesh: &TriMesh) -> Result<TriMesh, MeshError> {
     let (label, count) = Topology::new(mesh)?.components();
     let mut sizes = vec![0usize; count];
     label.iter().for_each(|l| sizes[*l as usize] += 1);
@@ -229,7 +249,7 @@ fn largest_component(mesh: &TriMesh, frame: FileFrame) -> Result<TriMesh, MeshEr
     let mut vertices = Vec::new();
     for (i, _) in label.iter().enumerate().filter(|(_, l)| **l == largest) {
         index[i] = vertices.len() as u32;
-        vertices.push(frame.to_metres(&mesh.vertices()[i]));
+        vertices.push(mesh.vertices()[i]);
     }
     let own = |f: &&Face| label[f[0] as usize] == largest;
     let faces = mesh.faces().iter().filter(own);

@@ -3,6 +3,7 @@
 use super::FormatError;
 use super::image::read_limited;
 use super::motion_clip::{CMU_PERIOD, MotionClip};
+use super::text_encoding::decode_text;
 use nalgebra::UnitQuaternion;
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -89,6 +90,19 @@ impl<'a> AsfLine<'a> {
     }
 }
 
+/// Takes the order of axes at the end of a line: XYZ, or none.
+///
+/// # Errors
+/// Another order.
+fn require_order(line: &mut AsfLine<'_>, what: &str) -> Result<(), FormatError> {
+    match line.words.next() {
+        Some(order) if !order.eq_ignore_ascii_case("xyz") => {
+            Err(line.fault(format!("{what}: order `{order}`, expected XYZ")))
+        }
+        _ => Ok(()),
+    }
+}
+
 /// Rotation by angles about the fixed axes x, y, z, applied in that order.
 fn euler(angles: V3d) -> UnitQuaternion<f64> {
     UnitQuaternion::from_euler_angles(angles.x, angles.y, angles.z)
@@ -137,6 +151,7 @@ impl AsfParser {
                     self.skeleton.root.push((is_translation, axis));
                 }
             }
+            ("root", "axis") => require_order(line, "root: axis")?,
             ("bonedata", "begin") => {
                 self.open = Some(OpenBone {
                     bone: AsfBone::new(""),
@@ -174,11 +189,12 @@ impl AsfParser {
             "length" => open.length = line.float(&format!("bone `{name}`: length"))?,
             "axis" => {
                 let angles = line.vector(&format!("bone `{name}`: axis"))?;
+                require_order(line, &format!("bone `{name}`: axis"))?;
                 open.bone.axis = euler(angles.map(|a| self.skeleton.angle(a)));
             }
             "dof" => {
                 while let Some(word) = line.words.next() {
-                    let axis = axis_of(word).filter(|_| word.starts_with('r'));
+                    let axis = axis_of(word).filter(|_| word.starts_with(['r', 'R']));
                     let axis =
                         axis.ok_or_else(|| line.fault(format!("bone `{name}`: no dof `{word}`")))?;
                     open.bone.dof.push(axis);
@@ -277,8 +293,7 @@ fn parse_asf(text: &str, path: &Path) -> Result<AsfSkeleton, FormatError> {
 /// # Errors
 /// Names file, line and bone.
 pub(super) fn read_asf_amc(asf: &Path, amc: &Path) -> Result<MotionClip, FormatError> {
-    let text =
-        |p: &Path| read_limited(p, MAX_BYTES).map(|b| String::from_utf8_lossy(&b).into_owned());
+    let text = |p: &Path| read_limited(p, MAX_BYTES).map(|b| decode_text(&b).into_owned());
     parse_asf_amc(&text(asf)?, asf, &text(amc)?, amc)
 }
 
@@ -339,10 +354,19 @@ fn parse_asf_amc(
     }
     let mut names: Vec<String> = s.bones.iter().map(|b| b.name.clone()).collect();
     names.extend(leaves.iter().map(|&i| format!("{}_end", s.bones[i].name)));
+    let parents = (0..s.bones.len()).map(|i| (i > 0).then(|| s.bones[i].parent));
+    let rest = AmcPose {
+        angles: vec![V3d::zeros(); s.bones.len()],
+        origin: V3d::zeros(),
+    };
     Ok(MotionClip {
         names,
+        parents: parents.chain(leaves.iter().map(|i| Some(*i))).collect(),
+        rest: rest.positions(&s, &leaves),
         frames,
         period: CMU_PERIOD,
+        is_y_up: false,
+        notes: vec!["AMC states no frame rate: 120 a second, as the CMU database".into()],
     })
 }
 

@@ -12,7 +12,7 @@
 //!   messages ([`mod@messages`]) live ([`mod@live`]), in [`mod@mcap_file`], [`mod@bag_file`] and [`mod@rosbag2`]; rectified:
 //!   [`mod@rectified`]; set upright: [`mod@reoriented`].
 //! - Lossless depth compression: [`mod@image::depth_codec`].
-//! - Motion clips: [`mod@bvh`], [`mod@asf_amc`].
+//! - Motion clips: [`mod@bvh`], [`mod@asf_amc`], [`mod@amass`].
 //! - GlTF, OBJ, MakeHuman: [`mod@gltf`], [`mod@obj`], [`mod@mhclo`]; unit and axes of a mesh file: [`mod@mesh_frame`].
 //! - Image size limits: [`mod@image::limits`].
 //!
@@ -21,6 +21,7 @@
 //! - Compression of positions, keyframe or delta: [`mod@position_codec`].
 #![allow(rustdoc::private_intra_doc_links)] // the index of ideas names private modules
 
+mod amass;
 mod asf_amc;
 mod bag_file;
 mod bvh;
@@ -45,6 +46,7 @@ mod motion_clip;
 pub mod npy;
 mod npy_frames;
 pub mod npz;
+mod npz_file;
 mod npz_recording;
 pub mod obj;
 mod obj_faces;
@@ -66,6 +68,7 @@ pub mod scan;
 pub mod sewn_obj;
 mod shared_data;
 mod sibling;
+mod text_encoding;
 mod texture_points;
 mod zip_entries;
 

@@ -120,7 +120,7 @@ pub(super) fn is_flat_header(header: &[u8]) -> bool {
 }
 
 /// Value of an IEEE 754 binary16 number.
-fn half(bits: u16) -> f32 {
+pub(super) fn half(bits: u16) -> f32 {
     let sign = if bits & 0x8000 == 0 { 1.0 } else { -1.0 };
     let (exponent, fraction) = (
         i32::from(bits >> 10 & 0x1f),

@@ -1,17 +1,8 @@
-//! Bodies in SMPL's npz layout: named numpy arrays in a zip.
-//!
-//! The entry's stated size, the header's shape and the following bytes must agree before an array is read, so that a
-//! broken or hostile file costs an error and no memory.
+//! Bodies in SMPL's npz layout.
 
 use super::FormatError;
-use npyz::{DType, NpyHeader, Order, TypeChar};
-use std::fs::File;
-use std::io::{BufReader, Read};
+use super::npz_file::{NpzArray, NpzFile};
 use std::path::Path;
-
-/// Largest array of a body, bytes: 55 joints × 50,000 vertices × 8 bytes is 22 MB, 300 shape directions of SMPL-X
-/// (10,475 vertices) are 75 MB.
-const MAX_ARRAY_BYTES: u64 = 512 << 20;
 
 /// The root's parent in SMPL's tables (−1 stored as u32).
 const NO_PARENT: i64 = 4_294_967_295;
@@ -36,8 +27,12 @@ pub struct SmplArrays {
     /// `posedirs`: offsets per entry of R − I of each joint but the root, metres, row-major, shape `(V, 3, 9 (J − 1))`; empty
     /// if absent.
     pub pose_directions: Vec<f32>,
-    /// `joint_names`, shape `(J)`; SMPL's own names if absent.
+    /// `joint_names`, shape `(J)`; if absent SMPL's own names of the joints that all its layouts share, and numbers.
     pub joint_names: Vec<String>,
+    /// The file has `joint_names`.
+    pub has_names: bool,
+    /// Statements about what was left out.
+    pub notes: Vec<String>,
 }
 
 /// Names of SMPL's first 24 joints, in its order.
@@ -68,197 +63,13 @@ pub const SMPL_JOINT_NAMES: [&str; 24] = [
     "right_hand",
 ];
 
-/// Numbers of one array in C order.
-struct Array {
-    shape: Vec<usize>,
-    data: Vec<f64>,
-}
-
-impl Array {
-    /// Length along a dimension; 0 if there is no such dimension.
-    fn side(&self, dimension: usize) -> usize {
-        self.shape.get(dimension).copied().unwrap_or(0)
-    }
-}
-
-/// The zip, and its path for errors.
-struct Archive<'a> {
-    path: &'a Path,
-    npz: npyz::npz::NpzArchive<BufReader<File>>,
-}
-
-impl Archive<'_> {
-    fn fault(&self, field: &str, why: impl Into<String>) -> FormatError {
-        FormatError::field(self.path, field, why)
-    }
-
-    /// Header and payload of an entry; `None` if there is no such array.
-    fn raw(&mut self, name: &str) -> Result<Option<(NpyHeader, Vec<u8>)>, FormatError> {
-        let path = self.path;
-        let fault = |why: String| FormatError::field(path, name, why);
-        let file = npyz::npz::file_name_from_array_name(name);
-        let zip = self.npz.zip_archive();
-        if !zip.file_names().any(|n| n == file) {
-            return Ok(None);
-        }
-        let entry = zip
-            .by_name(&file)
-            .map_err(|e| fault(format!("the zip entry cannot be opened ({e})")))?;
-        let size = entry.size();
-        if size > MAX_ARRAY_BYTES {
-            return Err(fault(format!(
-                "{size} bytes, but no body array is larger than {MAX_ARRAY_BYTES}"
-            )));
-        }
-        // The buffer grows as bytes arrive: the stated size alone allocates nothing.
-        let mut bytes = Vec::new();
-        let read = entry
-            .take(size + 1)
-            .read_to_end(&mut bytes)
-            .map_err(|e| fault(format!("cannot be read ({e})")))?;
-        if read as u64 != size {
-            return Err(fault(format!("{read} bytes found, {size} announced")));
-        }
-        let header_end = super::npy::data_start(&bytes)
-            .ok_or_else(|| fault("too short for a numpy array".into()))?;
-        if header_end > bytes.len() {
-            return Err(fault("its header is longer than the array".into()));
-        }
-        if !super::npy::is_flat_header(&bytes[..header_end]) {
-            return Err(fault("its header nests more than an array's".into()));
-        }
-        let header = NpyHeader::from_reader(&bytes[..])
-            .map_err(|e| fault(format!("is not a numpy array ({e})")))?;
-        let item = match header.dtype() {
-            DType::Plain(t) => t.num_bytes(),
-            _ => None,
-        };
-        let Some(item) = item.filter(|i| *i > 0) else {
-            return Err(fault(
-                "is a pickled or structured object; save it as a plain dense array".into(),
-            ));
-        };
-        let count = header
-            .shape()
-            .iter()
-            .try_fold(1u64, |n, d| n.checked_mul(*d));
-        let payload = bytes.split_off(header_end);
-        if count.and_then(|n| n.checked_mul(item as u64)) != Some(payload.len() as u64) {
-            return Err(fault(format!(
-                "shape {:?} of {item} bytes each does not match its {} bytes",
-                header.shape(),
-                payload.len()
-            )));
-        }
-        Ok(Some((header, payload)))
-    }
-
-    /// Numbers of any plain type as f64.
-    fn numbers(&mut self, name: &str) -> Result<Option<Array>, FormatError> {
-        let Some((header, bytes)) = self.raw(name)? else {
-            return Ok(None);
-        };
-        let DType::Plain(t) = header.dtype() else {
-            return Err(self.fault(name, "not a plain array"));
-        };
-        let item = t.num_bytes().unwrap_or(0);
-        if t.endianness() == npyz::Endianness::Big {
-            return Err(self.fault(
-                name,
-                "big-endian numbers are not supported; save it little-endian",
-            ));
-        }
-        /// The little-endian numbers of one type.
-        fn parse<const N: usize>(bytes: &[u8], f: impl Fn([u8; N]) -> f64) -> Vec<f64> {
-            bytes.as_chunks::<N>().0.iter().map(|c| f(*c)).collect()
-        }
-        let data = match (t.type_char(), item) {
-            (TypeChar::Float, 4) => parse(&bytes, |b| f64::from(f32::from_le_bytes(b))),
-            (TypeChar::Float, 8) => parse(&bytes, f64::from_le_bytes),
-            (TypeChar::Int, 4) => parse(&bytes, |b| f64::from(i32::from_le_bytes(b))),
-            (TypeChar::Int, 8) => parse(&bytes, |b| i64::from_le_bytes(b) as f64),
-            (TypeChar::Uint, 4) => parse(&bytes, |b| f64::from(u32::from_le_bytes(b))),
-            (TypeChar::Uint, 8) => parse(&bytes, |b| u64::from_le_bytes(b) as f64),
-            (c, n) => {
-                return Err(self.fault(name, format!("type {c:?} of {n} bytes is not supported")));
-            }
-        };
-        if let Some(i) = data.iter().position(|v| !v.is_finite()) {
-            return Err(self.fault(name, format!("value {i} is not finite")));
-        }
-        let shape: Vec<usize> = header.shape().iter().map(|d| *d as usize).collect();
-        let data = if header.order() == Order::Fortran {
-            to_c_order(&shape, &data)
-        } else {
-            data
-        };
-        Ok(Some(Array { shape, data }))
-    }
-
-    /// A numpy array of unicode strings (`<U`).
-    fn strings(&mut self, name: &str) -> Result<Option<Vec<String>>, FormatError> {
-        let Some((header, bytes)) = self.raw(name)? else {
-            return Ok(None);
-        };
-        let DType::Plain(t) = header.dtype() else {
-            return Err(self.fault(name, "not a plain array"));
-        };
-        let width = match t.type_char() {
-            TypeChar::UnicodeStr => t.num_bytes().unwrap_or(4),
-            c => return Err(self.fault(name, format!("type {c:?}; unicode strings were expected"))),
-        };
-        let text = |item: &[u8]| {
-            let codes = item
-                .as_chunks::<4>()
-                .0
-                .iter()
-                .map(|c| u32::from_le_bytes(*c));
-            codes
-                .take_while(|c| *c != 0)
-                .map(char::from_u32)
-                .collect::<Option<String>>()
-        };
-        let all: Option<Vec<String>> = bytes.chunks_exact(width).map(text).collect();
-        all.map(Some)
-            .ok_or_else(|| self.fault(name, "holds characters that are not unicode"))
-    }
-}
-
-/// Reorders Fortran-order data to C order.
-fn to_c_order(shape: &[usize], data: &[f64]) -> Vec<f64> {
-    let mut index = vec![0usize; shape.len()];
-    let mut strides = vec![1usize; shape.len()];
-    for k in 1..shape.len() {
-        strides[k] = strides[k - 1] * shape[k - 1];
-    }
-    let mut out = Vec::with_capacity(data.len());
-    for _ in 0..data.len() {
-        out.push(
-            data[index
-                .iter()
-                .zip(&strides)
-                .map(|(i, s)| i * s)
-                .sum::<usize>()],
-        );
-        for k in (0..shape.len()).rev() {
-            index[k] += 1;
-            if index[k] < shape[k] {
-                break;
-            }
-            index[k] = 0;
-        }
-    }
-    out
-}
-
 /// Reads the arrays of an SMPL-layout body and checks that they fit each other.
 ///
 /// # Errors
 /// [`FormatError`] naming the file and the array at fault.
 pub fn read_smpl(path: impl AsRef<Path>) -> Result<SmplArrays, FormatError> {
     let path = path.as_ref();
-    let npz = npyz::npz::NpzArchive::open(path).map_err(|e| FormatError::io(path, e))?;
-    let mut a = Archive { path, npz };
+    let mut a = NpzFile::open(path)?;
     let vertices = a.template()?;
     let faces = a.faces(vertices.len())?;
     let parents = a.parents()?;
@@ -267,8 +78,7 @@ pub fn read_smpl(path: impl AsRef<Path>) -> Result<SmplArrays, FormatError> {
     let weights = weights.ok_or_else(|| a.missing("weights"))?;
     let regressor = a.shaped("J_regressor", &[j, n])?.unwrap_or_default();
     let joint_regressor: Vec<f32> = regressor.iter().map(|x| *x as f32).collect();
-    let posedirs = a.shaped("posedirs", &[n, 3, 9 * (j - 1)])?;
-    let pose_directions = posedirs.unwrap_or_default();
+    let (pose_directions, notes) = a.pose_directions(n, j)?;
     let joints = match a.shaped("J", &[j, 3])? {
         Some(joints) => joints.as_chunks::<3>().0.to_vec(),
         None if joint_regressor.is_empty() => {
@@ -276,6 +86,7 @@ pub fn read_smpl(path: impl AsRef<Path>) -> Result<SmplArrays, FormatError> {
         }
         None => regress(&joint_regressor, &vertices),
     };
+    let named = a.joint_names(j)?;
     Ok(SmplArrays {
         faces,
         weights: weights.iter().map(|x| *x as f32).collect(),
@@ -283,20 +94,22 @@ pub fn read_smpl(path: impl AsRef<Path>) -> Result<SmplArrays, FormatError> {
         joint_regressor,
         shape_directions: a.shape_directions(n)?,
         pose_directions: pose_directions.iter().map(|x| *x as f32).collect(),
-        joint_names: a.joint_names(j)?,
+        has_names: named.is_some(),
+        joint_names: named.unwrap_or_else(|| default_names(j)),
         vertices,
         parents,
+        notes,
     })
 }
 
-impl Archive<'_> {
+impl NpzFile<'_> {
     fn missing(&self, name: &str) -> FormatError {
         self.fault(name, "missing; an SMPL-layout body needs it")
     }
-    fn required(&mut self, name: &str) -> Result<Array, FormatError> {
+    fn required(&mut self, name: &str) -> Result<NpzArray, FormatError> {
         self.numbers(name)?.ok_or_else(|| self.missing(name))
     }
-    fn expect_shape(&self, name: &str, a: &Array, wanted: &[usize]) -> Result<(), FormatError> {
+    fn expect_shape(&self, name: &str, a: &NpzArray, wanted: &[usize]) -> Result<(), FormatError> {
         if a.shape == wanted {
             return Ok(());
         }
@@ -356,20 +169,61 @@ impl Archive<'_> {
         let direction = |d: usize| (0..vertices).map(|i| at(d, i)).collect();
         Ok((0..count).map(direction).collect())
     }
-    fn joint_names(&mut self, joints: usize) -> Result<Vec<String>, FormatError> {
-        if let Some(names) = self.strings("joint_names")? {
-            if names.len() != joints {
-                let why = format!("{} names for {joints} joints", names.len());
-                return Err(self.fault("joint_names", why));
-            }
-            return Ok(names);
-        }
-        let name = |k: usize| {
-            let known = SMPL_JOINT_NAMES.get(k);
-            known.map_or_else(|| format!("joint_{k}"), |s| (*s).into())
+    /// Directions of pose for R − I of each joint but the root; STAR's own are left out, with a note.
+    fn pose_directions(
+        &mut self,
+        vertices: usize,
+        joints: usize,
+    ) -> Result<(Vec<f64>, Vec<String>), FormatError> {
+        let Some(array) = self.numbers("posedirs")? else {
+            return Ok((Vec::new(), Vec::new()));
         };
-        Ok((0..joints).map(name).collect())
+        let (entries, quaternions) = (9 * (joints - 1), 4 * (joints - 1));
+        if array.shape == [vertices, 3, quaternions + 1]
+            || array.shape == [vertices, 3, quaternions]
+        {
+            let note = format!(
+                "`posedirs` has STAR's {} pose features (quaternions): read without pose blend shapes",
+                array.side(2)
+            );
+            return Ok((Vec::new(), vec![note]));
+        }
+        if array.shape == [vertices, 3, entries] {
+            return Ok((array.data, Vec::new()));
+        }
+        let why = format!(
+            "shape {:?}, expected [{vertices}, 3, {entries}] (rotation entries of {joints} joints), or STAR's [{vertices}, 3, {}]",
+            array.shape,
+            quaternions + 1
+        );
+        Err(self.fault("posedirs", why))
     }
+    fn joint_names(&mut self, joints: usize) -> Result<Option<Vec<String>>, FormatError> {
+        let names = self.strings("joint_names")?;
+        if let Some(names) = &names
+            && names.len() != joints
+        {
+            let why = format!("{} names for {joints} joints", names.len());
+            return Err(self.fault("joint_names", why));
+        }
+        Ok(names)
+    }
+}
+
+/// SMPL's names of the first joints: of 22, or of all 24 where there are no more.
+fn default_names(joints: usize) -> Vec<String> {
+    /// Joints that SMPL, SMPL+H and SMPL-X have in common.
+    const COMMON: usize = 22;
+    let known = if joints <= SMPL_JOINT_NAMES.len() {
+        joints
+    } else {
+        COMMON
+    };
+    let name = |k: usize| {
+        let name = SMPL_JOINT_NAMES[..known].get(k);
+        name.map_or_else(|| format!("joint_{k}"), |s| (*s).into())
+    };
+    (0..joints).map(name).collect()
 }
 
 /// Product `regressor · points`, shape `(J)`, of a row-major regressor of shape `(J, points)`.
@@ -455,6 +309,24 @@ mod tests {
         }
     }
 
+    /// STAR's pose features are quaternions and a shape coefficient: 4 · 23 + 1 for 24 joints, 1 for one.
+    #[test]
+    fn pose_directions_of_star_are_left_out_and_said() {
+        let dir = tempfile::tempdir().expect("dir");
+        let star = read_smpl(write(dir.path(), "posedirs", &[3, 3, 1], &[0.0; 9])).expect("valid");
+        assert!(star.pose_directions.is_empty() && star.notes[0].contains("STAR"));
+        assert!(!star.has_names);
+    }
+
+    #[test]
+    fn default_names_stop_where_layouts_part() {
+        assert_eq!(default_names(24)[22..], ["left_hand", "right_hand"]);
+        assert_eq!(
+            default_names(55)[20..24],
+            ["left_wrist", "right_wrist", "joint_22", "joint_23"]
+        );
+    }
+
     #[test]
     fn broken_files_are_errors() {
         let dir = tempfile::tempdir().expect("dir");
@@ -475,13 +347,5 @@ mod tests {
             read_smpl(dir.path().join("absent.npz")),
             Err(FormatError::Io { .. })
         ));
-    }
-
-    #[test]
-    fn fortran_order_is_undone() {
-        assert_eq!(
-            to_c_order(&[2, 3], &[1.0, 4.0, 2.0, 5.0, 3.0, 6.0]),
-            [1.0, 2.0, 3.0, 4.0, 5.0, 6.0]
-        );
     }
 }

@@ -4,7 +4,7 @@ use super::FormatError;
 use super::face_origins::FaceOrigins;
 use super::image::read_limited;
 use super::obj_parser::{ObjFaults, parse_records};
-use super::obj_text::decoded;
+use super::text_encoding::decode_text;
 use std::fmt::Write as _;
 use std::path::Path;
 use tryon_geometry::math::P3;
@@ -76,7 +76,7 @@ impl ObjMesh {
 /// Names the line and its fault: a malformed number, an index out of range, a polygon with fewer than three corners; or the
 /// text without vertices or faces.
 pub fn read_obj(path: &Path) -> Result<ObjMesh, FormatError> {
-    parse_obj(&decoded(&read_limited(path, MAX_BYTES)?), path)
+    parse_obj(&decode_text(&read_limited(path, MAX_BYTES)?), path)
 }
 
 /// Parses OBJ text; `origin` is named in errors.

@@ -1,25 +1,6 @@
-//! Text of OBJ files as editors and exporters write it: its encoding, ends of lines, continued lines.
+//! Text of OBJ files as editors and exporters write it: ends of lines, continued lines.
 
 use std::borrow::Cow;
-
-/// Text of a file: UTF-8 or UTF-16, by its byte order mark or by the zeros of ASCII letters in UTF-16. Bytes that are neither
-/// become U+FFFD; only names and comments have such.
-pub(super) fn decoded(bytes: &[u8]) -> Cow<'_, str> {
-    let is_zero = |k: usize| bytes.get(k) == Some(&0);
-    match bytes {
-        [0xef, 0xbb, 0xbf, rest @ ..] => String::from_utf8_lossy(rest),
-        [0xff, 0xfe, rest @ ..] => utf16(rest, u16::from_le_bytes),
-        [0xfe, 0xff, rest @ ..] => utf16(rest, u16::from_be_bytes),
-        _ if is_zero(1) && is_zero(3) => utf16(bytes, u16::from_le_bytes),
-        _ if is_zero(0) && is_zero(2) => utf16(bytes, u16::from_be_bytes),
-        _ => String::from_utf8_lossy(bytes),
-    }
-}
-
-fn utf16(bytes: &[u8], unit: fn([u8; 2]) -> u16) -> Cow<'_, str> {
-    let units: Vec<u16> = bytes.chunks_exact(2).map(|b| unit([b[0], b[1]])).collect();
-    String::from_utf16_lossy(&units).into()
-}
 
 /// Lines with their numbers from 1, without comments. They end with LF, CR or CR LF; one that ends with a backslash goes on in
 /// the next one.
@@ -64,29 +45,6 @@ fn next_line<'t>(rest: &mut &'t str) -> &'t str {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn encodings_agree() {
-        let text = "v 0 0 0\no Hemd\u{fc}\u{1f455}\n";
-        let with = |mark: &[u8], units: fn(u16) -> [u8; 2]| -> Vec<u8> {
-            mark.iter()
-                .copied()
-                .chain(text.encode_utf16().flat_map(units))
-                .collect()
-        };
-        let encoded = [
-            text.as_bytes().to_vec(),
-            [&[0xef, 0xbb, 0xbf], text.as_bytes()].concat(),
-            with(&[0xff, 0xfe], u16::to_le_bytes),
-            with(&[0xfe, 0xff], u16::to_be_bytes),
-            with(&[], u16::to_le_bytes),
-            with(&[], u16::to_be_bytes),
-        ];
-        for bytes in encoded {
-            assert_eq!(decoded(&bytes), text, "{bytes:?}");
-        }
-        assert_eq!(decoded(b"o Kost\xfcm"), "o Kost\u{fffd}m");
-    }
 
     #[test]
     fn lines_end_and_go_on_in_every_way() {

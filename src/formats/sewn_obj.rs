@@ -4,7 +4,8 @@
 use super::FormatError;
 use super::image::read_limited;
 use super::obj::{ObjMesh, parse_obj};
-use super::obj_text::{decoded, lines};
+use super::obj_text::lines;
+use super::text_encoding::decode_text;
 use std::path::Path;
 
 /// Largest file, bytes; the shared dress of 15,656 vertices has 2.5 MB.
@@ -35,7 +36,7 @@ pub struct SewnObj {
 /// # Errors
 /// As [`parse_sewn_obj`], or when the file cannot be read.
 pub fn read_sewn_obj(path: &Path) -> Result<SewnObj, FormatError> {
-    parse_sewn_obj(&decoded(&read_limited(path, MAX_BYTES)?), path)
+    parse_sewn_obj(&decode_text(&read_limited(path, MAX_BYTES)?), path)
 }
 
 /// Parses OBJ text with its stitches; `origin` is named in errors.

@@ -4,8 +4,12 @@ use super::routine::{Routine, ease};
 use super::settings::StanceSettings;
 use super::stance::{Limb, Rig, Stance};
 use nalgebra::{Matrix3, Rotation3, UnitQuaternion};
-use tryon_formats::MotionClip;
+use tryon_body::human_joints::{HumanJoints, JointTree, LimbChain, SideBasis, SideEvidence};
+use tryon_formats::{MeshAxis, MotionClip};
 use tryon_geometry::math::{P3d, V3d, log_so3};
+
+/// Component of the mean trunk along an axis from which on people stand along it.
+const STANDING: f64 = 0.6;
 
 /// The joints of a clip that a stance needs, `[left, right]` where there are two.
 #[derive(Clone, Debug)]
@@ -25,6 +29,7 @@ struct Landmarks {
 /// A clip with its landmarks.
 #[derive(Clone, Debug)]
 pub(super) struct Performance {
+    /// Upright: y up.
     clip: MotionClip,
     at: Landmarks,
     /// Pelvis in the first frame, floor height, and turn that makes the first frame face +z.
@@ -33,32 +38,17 @@ pub(super) struct Performance {
     facing: UnitQuaternion<f64>,
     /// Length of thigh and shank, in the clip's unit.
     leg: f64,
+    /// Statements about what was recognised, one a sentence.
+    notes: Vec<String>,
 }
 
 /// A clip that cannot be played on a body.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error(
-    "motion clip: no joint for `{0}`; looked for names of the CMU, MakeHuman and Mixamo skeletons"
-)]
+#[error("motion clip: {0}")]
 pub struct ClipError(
-    /// The landmark that was not found.
+    /// The fault and the expectation.
     pub String,
 );
-
-/// Joint names of a landmark: CMU's ASF, two MakeHuman BVH rigs, Mixamo. `?` and `*` stand for the side.
-const NAMES: [(&str, &[&str]); 8] = [
-    ("hip", &["?femur", "?Thigh", "?hip", "*UpLeg"]),
-    ("knee", &["?tibia", "?Shin", "?knee", "*Leg"]),
-    ("ankle", &["?foot", "*Foot"]),
-    ("toe", &["?toes", "toe2-1.?", "?Foot_end", "*ToeBase"]),
-    ("shoulder", &["?humerus", "?Shldr", "?shoulder", "*Arm"]),
-    ("elbow", &["?radius", "?ForeArm", "?elbow", "*ForeArm"]),
-    ("wrist", &["?wrist", "?hand", "*Hand"]),
-    (
-        "hand",
-        &["?fingers", "?Mid1", "finger3-1.?", "*HandMiddle1"],
-    ),
-];
 
 /// Frame with x to the left of the body and y as near to `up` as can be.
 fn basis(left: V3d, up: V3d) -> Option<UnitQuaternion<f64>> {
@@ -70,46 +60,95 @@ fn basis(left: V3d, up: V3d) -> Option<UnitQuaternion<f64>> {
     ))
 }
 
+/// A person's joints in a clip: by the lengths of bones, sides by feet, knees and elbows over all frames and by names.
+fn joints_of(clip: &MotionClip) -> Result<(HumanJoints, SideBasis), ClipError> {
+    let first = clip.frames.first();
+    let first = first.ok_or_else(|| ClipError("it has no frames".into()))?;
+    let tree = |places| JointTree {
+        parents: &clip.parents,
+        places,
+        names: &clip.names,
+    };
+    // Files without offsets have their lengths in the frames.
+    let rest = HumanJoints::find(&tree(&clip.rest));
+    let found = rest.or_else(|_| HumanJoints::find(&tree(first)));
+    let found = found.map_err(ClipError)?;
+    let mut evidence = SideEvidence::default();
+    for frame in &clip.frames {
+        evidence.add(&found, frame);
+    }
+    found
+        .sided(&tree(first), evidence.mean())
+        .map_err(ClipError)
+}
+
+/// Turns a clip to y up: people in it stand along their mean direction from hips to shoulders.
+fn upright(mut clip: MotionClip, joints: &HumanJoints) -> (MotionClip, Option<String>) {
+    let middle =
+        |f: &[P3d], pair: &[LimbChain; 2]| nalgebra::center(&f[pair[0].root()], &f[pair[1].root()]);
+    let trunk = |f: &Vec<P3d>| (middle(f, &joints.arms) - middle(f, &joints.legs)).normalize();
+    let mean = clip.frames.iter().map(trunk).sum::<V3d>() / clip.frames.len().max(1) as f64;
+    let Some((up, cosine)) = MeshAxis::nearest(mean.into()) else {
+        return (clip, None);
+    };
+    if up == MeshAxis::Y || clip.is_y_up {
+        return (clip, None);
+    }
+    if cosine * mean.norm() < STANDING {
+        let note = format!(
+            "lies or turns over in most frames ({up} is the nearest axis to its trunk): taken as y up"
+        );
+        return (clip, Some(note));
+    }
+    let axis = V3d::from(up.vector());
+    let turn = UnitQuaternion::rotation_between(&axis, &V3d::y())
+        .unwrap_or_else(|| UnitQuaternion::from_axis_angle(&V3d::x_axis(), std::f64::consts::PI));
+    let places = clip.frames.iter_mut().flatten().chain(&mut clip.rest);
+    places.for_each(|p| *p = turn * *p);
+    (
+        clip,
+        Some(format!(
+            "{up} up in most frames: turned to y up, as a person who lies throughout would be"
+        )),
+    )
+}
+
+impl Landmarks {
+    fn new(joints: &HumanJoints, shoulders: usize) -> Self {
+        let (legs, arms) = (&joints.legs, &joints.arms);
+        Self {
+            hip: legs.each_ref().map(LimbChain::root),
+            knee: legs.each_ref().map(LimbChain::hinge),
+            ankle: legs.each_ref().map(LimbChain::end),
+            toe: legs.each_ref().map(LimbChain::after_end),
+            shoulder: arms.each_ref().map(LimbChain::root),
+            elbow: arms.each_ref().map(LimbChain::hinge),
+            wrist: arms.each_ref().map(LimbChain::end),
+            hand: arms.each_ref().map(LimbChain::after_end),
+            neck: joints.neck.or(joints.head).unwrap_or(shoulders),
+            head: joints.head.zip(joints.head_top).map(|(a, b)| [a, b]),
+        }
+    }
+}
+
 impl Performance {
     /// Finds the joints.
     pub(super) fn new(clip: MotionClip) -> Result<Self, ClipError> {
-        let find = |what: &str| -> [Option<usize>; 2] {
-            let names = NAMES.iter().find(|n| n.0 == what).map_or(&[][..], |n| n.1);
-            [["l", "Left"], ["r", "Right"]].map(|[short, long]| {
-                let names: Vec<String> = names
-                    .iter()
-                    .map(|n| n.replace('?', short).replace('*', long))
-                    .collect();
-                clip.joint(&names.iter().map(String::as_str).collect::<Vec<_>>())
-            })
-        };
-        let both = |what: &str| match find(what) {
-            [Some(l), Some(r)] => Ok([l, r]),
-            [None, _] => Err(ClipError(format!("left {what}"))),
-            _ => Err(ClipError(format!("right {what}"))),
-        };
-        let neck = clip
-            .joint(&["lowerneck", "neck"])
-            .ok_or_else(|| ClipError("neck".into()))?;
-        let at = Landmarks {
-            hip: both("hip")?,
-            knee: both("knee")?,
-            ankle: both("ankle")?,
-            toe: find("toe"),
-            shoulder: both("shoulder")?,
-            elbow: both("elbow")?,
-            wrist: both("wrist")?,
-            hand: find("hand"),
-            neck,
-            head: clip
-                .joint(&["head"])
-                .zip(clip.joint(&["head_end"]))
-                .map(|(a, b)| [a, b]),
-        };
-        let first = clip
-            .frames
-            .first()
-            .ok_or_else(|| ClipError("frames".into()))?;
+        let (joints, sides) = joints_of(&clip)?;
+        let mut notes = clip.statements();
+        match sides {
+            SideBasis::Both => {}
+            SideBasis::Ahead => notes.push("left and right by feet, knees and elbows: its names name no sides".into()),
+            SideBasis::Names => notes.push("left and right by its names: its feet, knees and elbows show no way ahead".into()),
+            SideBasis::AgainstNames => notes.push("left and right by feet, knees and elbows; its names say the opposite: it is mirrored, or they are".into()),
+        }
+        let (clip, turned) = upright(clip, &joints);
+        notes.extend(turned);
+        let at = Landmarks::new(
+            &joints,
+            joints.spine.last().copied().unwrap_or(joints.pelvis),
+        );
+        let first = &clip.frames[0];
         let middle = |f: &[P3d]| nalgebra::center(&f[at.hip[0]], &f[at.hip[1]]);
         let start = middle(first);
         let left = first[at.hip[0]] - first[at.hip[1]];
@@ -123,7 +162,7 @@ impl Performance {
         let leg = (first[at.hip[0]] - first[at.knee[0]]).norm()
             + (first[at.knee[0]] - first[at.ankle[0]]).norm();
         if leg.is_nan() || leg <= 0.0 {
-            return Err(ClipError("a leg with a length".into()));
+            return Err(ClipError("its legs have no length".into()));
         }
         Ok(Self {
             start,
@@ -132,7 +171,13 @@ impl Performance {
             leg,
             at,
             clip,
+            notes,
         })
+    }
+
+    /// Statements about what was recognised, one a sentence.
+    pub(super) fn notes(&self) -> &[String] {
+        &self.notes
     }
 
     /// Stance at `t`: calibration pose, blend, then the clip.
@@ -225,13 +270,16 @@ mod tests {
     fn a_clip_without_joints_is_refused() {
         let clip = MotionClip {
             names: vec!["root".into()],
-            frames: vec![],
+            parents: vec![None],
+            rest: vec![nalgebra::Point3::origin()],
+            frames: vec![vec![nalgebra::Point3::origin()]],
             period: 0.01,
+            ..MotionClip::default()
         };
         let e = Sequence::new(Actor::default(), Setting::default())
             .with_clip(clip)
             .expect_err("no joints");
-        assert!(e.to_string().contains("neck"), "{e}");
+        assert!(e.to_string().contains("two legs"), "{e}");
     }
 
     #[test]

@@ -192,6 +192,10 @@ impl Sequence {
         self.performance = Some(Arc::new(Performance::new(clip)?));
         Ok(self)
     }
+    /// Statements about the clip, one a sentence: its frame rate, its first frame, what was recognised and turned.
+    pub fn clip_notes(&self) -> &[String] {
+        self.performance.as_ref().map_or(&[], |p| p.notes())
+    }
     /// Time before a clip plays, seconds: calibration pose and blend.
     pub fn clip_lead(&self) -> f64 {
         self.rig.settings.hold + self.rig.settings.blend

@@ -6,14 +6,13 @@ use serde::Deserialize;
 use std::path::Path;
 use std::sync::Arc;
 use std::time::Duration;
-use tryon::body::{Template, embedded, import::template_from_smpl};
+use tryon::body::{Template, embedded, import::read_body};
 use tryon::dressing::{
     GarmentFile, MeshGarment, MeshGarmentError, MeshGarmentSettings, SourceBody,
 };
 use tryon::formats::MeshFrame;
 use tryon::formats::fabric_json::parse_fabric;
 use tryon::formats::garmentcode::{is_garmentcode, parse_garmentcode};
-use tryon::formats::npz::read_smpl;
 use tryon::garment::import::from_garmentcode;
 use tryon::garment::{FabricSample, Material, Pattern, Size, Triangulation};
 use tryon::mirror::{CapturedWardrobe, Choice};
@@ -26,13 +25,11 @@ pub(crate) fn template(path: Option<&Path>) -> Result<Arc<Template>> {
     let Some(path) = path else {
         return Ok(embedded::template());
     };
-    let name = path
-        .file_stem()
-        .map_or_else(|| "body".to_owned(), |s| s.to_string_lossy().into_owned());
-    let arrays = read_smpl(path)?;
-    let template = template_from_smpl(&name, &arrays)
-        .with_context(|| format!("cannot use {}", path.display()))?;
-    Ok(Arc::new(template))
+    let body = read_body(path, &MeshFrame::default())?;
+    for note in &body.notes {
+        eprintln!("{}: {note}", path.display());
+    }
+    Ok(Arc::new(body.template))
 }
 
 /// Sewing pattern from a file: our own JSON, or GarmentCode's, cut from cotton.

@@ -4,7 +4,7 @@ use std::path::Path;
 use std::sync::{Arc, OnceLock};
 use std::time::Instant;
 use tryon_body::{BodyShape, Template, embedded, import};
-use tryon_formats::npz;
+use tryon_formats::MeshFrame;
 use tryon_geometry::camera::{Calibration, Intrinsics};
 use tryon_kit::frames::{Exposure, stage};
 use tryon_kit::telemetry::record_skipped;
@@ -20,13 +20,11 @@ pub(crate) fn load_template(path: &Path) -> Result<Arc<Template>, String> {
     if path.as_os_str().is_empty() {
         return Ok(embedded::template());
     }
-    let arrays = npz::read_smpl(path).map_err(|e| e.to_string())?;
-    let name = path
-        .file_stem()
-        .map_or_else(|| "body".into(), |n| n.to_string_lossy().into_owned());
-    let template = import::template_from_smpl(&name, &arrays)
-        .map_err(|e| format!("{}: {e}", path.display()))?;
-    Ok(Arc::new(template))
+    let body = import::read_body(path, &MeshFrame::default()).map_err(|e| e.to_string())?;
+    for note in &body.notes {
+        tracing::info!(body = %path.display(), "{note}");
+    }
+    Ok(Arc::new(body.template))
 }
 
 /// Tracker model of the configured template, made once and beside the start of the service: it takes as long as several

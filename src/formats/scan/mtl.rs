@@ -2,8 +2,9 @@
 
 use crate::FormatError;
 use crate::image::read_limited;
-use crate::obj_text::{decoded, lines};
+use crate::obj_text::lines;
 use crate::sibling::sibling;
+use crate::text_encoding::decode_text;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
@@ -31,7 +32,7 @@ pub(super) fn read_libraries(
     for path in library_paths(origin, libraries)? {
         let bytes = read_limited(&path, MAX_BYTES)
             .map_err(|e| FormatError::field(origin, "mtllib", e.to_string()))?;
-        add_library(&decoded(&bytes), &path, &mut materials)?;
+        add_library(&decode_text(&bytes), &path, &mut materials)?;
     }
     Ok(materials)
 }

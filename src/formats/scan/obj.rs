@@ -6,7 +6,7 @@ use super::texture::corner_colors;
 use crate::FormatError;
 use crate::image::read_limited;
 use crate::obj_parser::{ObjFaults, parse_records};
-use crate::obj_text::decoded;
+use crate::text_encoding::decode_text;
 use std::path::Path;
 
 /// Largest OBJ scan, bytes; a scan of 5 million vertices takes about 1 GB.
@@ -18,7 +18,7 @@ const MAX_BYTES: u64 = 2 << 30;
 /// Names the line at fault, or the material library or texture that is missing.
 pub(super) fn read_obj_scan(path: &Path) -> Result<ScanMesh, FormatError> {
     let bytes = read_limited(path, MAX_BYTES)?;
-    let records = parse_records(&decoded(&bytes), path, ObjFaults::Kept)?;
+    let records = parse_records(&decode_text(&bytes), path, ObjFaults::Kept)?;
     if records.vertices.is_empty() {
         return Err(FormatError::field(path, "points", records.found()));
     }

@@ -246,7 +246,7 @@ fn on_motion(
     template: &Arc<Template>,
     frames: CapturedFrames,
 ) -> Result<CapturedFrames> {
-    let clip = read_motion(path)?.at_cmu_rate();
+    let clip = read_motion(path)?;
     let count = (clip.seconds() * RATE).floor() as u64;
     let setting = Setting {
         rate: RATE,
@@ -260,7 +260,17 @@ fn on_motion(
     let sequence = Sequence::new(actor, setting)
         .with_clip(clip)
         .with_context(|| format!("{}", path.display()))?;
-    let pose = |i| sequence.truth(i).pose.transformed(&world_from_camera);
+    for note in sequence.clip_notes() {
+        eprintln!("{}: {note}", path.display());
+    }
+    // The calibration pose before the clip is not part of it.
+    let lead = (sequence.clip_lead() * RATE).round() as u64;
+    let pose = |i| {
+        sequence
+            .truth(lead + i)
+            .pose
+            .transformed(&world_from_camera)
+    };
     let first = frames.displacements.into_iter().next();
     let first = first.context("the capture has no finished scan")?;
     let poses: Vec<_> = (0..count.max(1)).map(pose).collect();

@@ -1,5 +1,19 @@
 //! Import of SMPL-layout arrays as a template with anatomical joints.
 
+mod file_error;
+mod file_frame;
+#[cfg(test)]
+mod frame_tests;
+mod joint_names;
+mod read;
+mod standing_surface;
+mod stature;
+
+pub use file_error::BodyFileError;
+pub use read::{BodyFile, body_of_arrays, read_body};
+pub use standing_surface::StandingFrame;
+pub use stature::unit_of_stature;
+
 use super::{
     BodyError, Joint, JointMotion, PoseShapes, ShapeSpace, Skeleton, SkinWeights, Template,
 };
