@@ -260,7 +260,7 @@ mod tests {
         .expect("split");
         let notes = m.notes.join("; ");
         assert!(
-            notes.contains("1 edge with more than two faces split (line 9 of `b`)"),
+            notes.contains("1 edge with more than two faces split (line 10 of `b`)"),
             "{notes}"
         );
         let parts: Vec<String> = split(&m.sewn)
