@@ -74,3 +74,32 @@ fn a_tube_is_the_same_however_it_is_written() {
         }
     }
 }
+
+#[test]
+fn damaged_files_never_panic() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("testdata/meshes");
+    let scratch = tempfile::tempdir().expect("a folder");
+    let mut x = 0x9e37_79b9u32;
+    let mut random = |n: usize| {
+        x ^= x << 13;
+        x ^= x >> 17;
+        x ^= x << 5;
+        x as usize % n
+    };
+    for entry in std::fs::read_dir(&folder).expect("a folder").flatten() {
+        let name = entry.file_name();
+        let bytes = std::fs::read(entry.path()).expect("readable");
+        let path = scratch.path().join(&name);
+        for _ in 0..200 {
+            let mut damaged = bytes.clone();
+            for _ in 0..1 + random(4) {
+                // Bytes of the file itself keep numbers numbers and base64 base64.
+                damaged[random(bytes.len())] = bytes[random(bytes.len())];
+            }
+            std::fs::write(&path, damaged).expect("written");
+            if let Ok(file) = read_mesh(&path, None) {
+                assert!(Topology::new(&file.sewn.obj.mesh).is_ok(), "{name:?}");
+            }
+        }
+    }
+}
