@@ -1,12 +1,12 @@
 //! Rows of glTF accessors: any component type, sparse or compressed. Each accessor is checked against the size of its buffer
 //! before it is read.
 
-use super::uri::external;
-use super::{draco, meshopt};
+use super::buffers::Buffers;
+use super::draco;
 use crate::FormatError;
 use ::gltf::accessor::sparse::IndexType;
 use ::gltf::accessor::{DataType, Dimensions};
-use ::gltf::buffer::{Source, View};
+use ::gltf::buffer::View;
 use ::gltf::{Accessor, Document};
 use serde_json::Value;
 use std::collections::HashMap;
@@ -15,11 +15,9 @@ use std::path::Path;
 /// Most bytes of an accessor without a buffer view, whose rows are zero.
 const MOST_ZEROS: usize = 256 << 20;
 
-/// Contents of the buffers of a document.
+/// Accessors of a document.
 pub(super) struct Accessors {
-    buffers: Vec<Vec<u8>>,
-    /// Decompressed contents of buffer views.
-    views: HashMap<usize, Vec<u8>>,
+    buffers: Buffers,
     /// Decompressed rows of accessors, without gaps.
     rows: HashMap<usize, Vec<u8>>,
 }
@@ -41,48 +39,15 @@ impl Accessors {
         blob: Option<Vec<u8>>,
         origin: &Path,
     ) -> Result<Self, FormatError> {
-        let mut blob = blob;
-        let mut out = Self {
-            buffers: Vec::new(),
-            views: HashMap::new(),
-            rows: HashMap::new(),
-        };
-        for b in document.buffers() {
-            let field = format!("buffer {}", b.index());
-            let data = match b.source() {
-                Source::Bin if meshopt::is_fallback(json, b.index()) => Vec::new(),
-                Source::Bin => blob.take().ok_or_else(|| {
-                    FormatError::field(origin, &field, "the file has no binary chunk")
-                })?,
-                Source::Uri(uri) => external(uri, origin, &field)?,
-            };
-            let is_fallback = data.is_empty() && meshopt::is_fallback(json, b.index());
-            if data.len() < b.length() && !is_fallback {
-                let why = format!("{} bytes, {} announced", data.len(), b.length());
-                return Err(FormatError::field(origin, field, why));
-            }
-            out.buffers.push(data);
-        }
-        out.views = meshopt::decoded_views(json, &out.buffers).map_err(|(view, why)| {
-            FormatError::field(origin, format!("buffer view {view}"), why)
-        })?;
-        out.rows = draco::decoded_rows(document, json, &out)
+        let buffers = Buffers::read(document, json, blob, origin)?;
+        let rows = draco::decoded_rows(document, json, &buffers)
             .map_err(|(place, why)| FormatError::field(origin, place, why))?;
-        Ok(out)
+        Ok(Self { buffers, rows })
     }
 
     /// Bytes of a buffer view.
     pub(super) fn view(&self, view: &View<'_>) -> Result<&[u8], String> {
-        if let Some(decoded) = self.views.get(&view.index()) {
-            return Ok(decoded);
-        }
-        let buffer = self
-            .buffers
-            .get(view.buffer().index())
-            .ok_or("no such buffer")?;
-        let range = view.offset()..view.offset().saturating_add(view.length());
-        let data = buffer.get(range);
-        data.ok_or_else(|| "the buffer view is longer than its buffer".into())
+        self.buffers.view(view)
     }
 
     /// Rows of `size` bytes from `offset` in a buffer view.

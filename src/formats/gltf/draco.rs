@@ -1,6 +1,6 @@
 //! Primitives compressed by Draco: extension KHR_draco_mesh_compression. The crate draco-core decodes the bitstream.
 
-use super::accessors::Accessors;
+use super::buffers::Buffers;
 use ::gltf::accessor::DataType;
 use ::gltf::{Accessor, Document};
 use draco_core::{DecodeLimits, DecoderBuffer, Mesh, MeshDecoder};
@@ -24,7 +24,7 @@ type PlaceFault = (String, String);
 pub(super) fn decoded_rows(
     document: &Document,
     json: &Value,
-    accessors: &Accessors,
+    buffers: &Buffers,
 ) -> Result<HashMap<usize, Vec<u8>>, PlaceFault> {
     let mut out = HashMap::new();
     let meshes = json.get("meshes").and_then(Value::as_array);
@@ -36,7 +36,7 @@ pub(super) fn decoded_rows(
             };
             let reader = DracoReader {
                 document,
-                accessors,
+                buffers,
                 primitive,
                 extension,
             };
@@ -50,7 +50,7 @@ pub(super) fn decoded_rows(
 /// Compressed primitive.
 struct DracoReader<'a> {
     document: &'a Document,
-    accessors: &'a Accessors,
+    buffers: &'a Buffers,
     primitive: &'a Value,
     extension: &'a Value,
 }
@@ -64,7 +64,7 @@ impl DracoReader<'_> {
             .views()
             .nth(view)
             .ok_or("no such buffer view")?;
-        let mesh = decoded(self.accessors.view(&view)?)?;
+        let mesh = decoded(self.buffers.view(&view)?)?;
         if let Some(a) = self.accessor(self.primitive.get("indices"))? {
             let corners = mesh.faces().iter().flatten();
             let corners: Vec<f64> = corners.map(|p| f64::from(p.0)).collect();

@@ -2,6 +2,7 @@
 
 mod accessors;
 mod base_colors;
+mod buffers;
 mod deform;
 mod document;
 mod draco;

@@ -108,6 +108,7 @@ impl GltfModel {
             face_uv,
             origins,
             notes: self.notes,
+            ..ObjMesh::default()
         }
     }
 }

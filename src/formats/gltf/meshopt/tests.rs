@@ -1,4 +1,4 @@
-//! Streams written by meshoptimizer's own encoder; `tests/data` has none, so they are spelled out.
+//! Tests of the filters; `tryon-garment` has streams of meshoptimizer's own encoder.
 
 use super::*;
 

@@ -34,7 +34,7 @@ pub(super) fn decode(data: &[u8], count: usize, stride: usize) -> Result<Vec<u8>
     let mut previous = data[data.len() - stride..].to_vec();
     let mut stream = &data[1..tail];
 
-    let block = BLOCK.0.min(BLOCK.1 / stride & !(GROUP - 1));
+    let block = BLOCK.0.min((BLOCK.1 / stride) & !(GROUP - 1));
     let mut out = vec![0; count * stride];
     for elements in out.chunks_mut(block * stride) {
         let n = elements.len() / stride;
