@@ -26,6 +26,8 @@ pub struct ObjMesh {
     pub origins: FaceOrigins,
     /// Changes and elements left out, for people.
     pub notes: Vec<String>,
+    /// Faces of the file that were left out or lost corners.
+    pub dropped: usize,
 }
 
 impl From<TriMesh> for ObjMesh {
@@ -97,6 +99,7 @@ pub fn parse_obj(text: &str, origin: &Path) -> Result<ObjMesh, FormatError> {
         face_uv: face_uv.unwrap_or_default(),
         origins: records.origins,
         notes: records.notes,
+        dropped: records.dropped,
     })
 }
 
@@ -192,7 +195,7 @@ mod tests {
             "{QUAD}f 1 2 2\nf 1 2 2 3\nf 4 1 2 3 4\nf 1 2 1 2\nf 1 2 3"
         ))
         .expect("valid");
-        assert_eq!(m.mesh.faces().len(), 1 + 2 + 1);
+        assert_eq!((m.mesh.faces().len(), m.dropped), (1 + 2 + 1, 4));
         assert_eq!(m.notes.len(), 2, "{:?}", m.notes);
         assert!(
             m.notes[0].contains("2 faces") && m.notes[0].contains("lines 6, 7"),

@@ -166,6 +166,11 @@ impl FacesBuilder {
         Ok(())
     }
 
+    /// Faces that were left out or lost corners.
+    pub(super) fn dropped(&self) -> usize {
+        self.mended.count + self.lost.count
+    }
+
     /// Notes on the changes and on what is not used.
     pub(super) fn notes(&self) -> impl Iterator<Item = String> {
         let mended = "without a corner that repeats its neighbour";

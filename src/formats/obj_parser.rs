@@ -68,6 +68,7 @@ pub(super) fn parse_records(
             )
         })?;
     }
+    records.dropped = builder.dropped();
     records.notes.extend(builder.notes());
     records.notes.extend(records.untaken());
     Ok(records)

@@ -28,6 +28,8 @@ pub(super) struct ObjRecords {
     pub(super) origins: FaceOrigins,
     /// Changes, for people.
     pub(super) notes: Vec<String>,
+    /// Faces that were left out or lost corners.
+    pub(super) dropped: usize,
     /// Lines by their first word, the first few different ones.
     pub(super) words: BTreeMap<String, usize>,
     /// Lines.

@@ -74,14 +74,19 @@ pub fn parse(text: &str, origin: &Path, folder: Option<&Path>) -> Result<Scene, 
     };
     let file: SceneFile = serde_json::from_str(text).map_err(|e| fault("json", e.to_string()))?;
     file.check().map_err(|(field, why)| fault(field, why))?;
-    let mesh = match (&file.mesh, &file.mesh_obj, folder) {
-        (Some(name), None, Some(folder)) => read_obj(&folder.join(name))?.mesh,
-        (None, Some(obj), _) => parse_obj(obj, &origin.join("mesh_obj"))?.mesh,
+    let obj = match (&file.mesh, &file.mesh_obj, folder) {
+        (Some(name), None, Some(folder)) => read_obj(&folder.join(name))?,
+        (None, Some(obj), _) => parse_obj(obj, &origin.join("mesh_obj"))?,
         (Some(_), None, None) => {
             return Err(fault("mesh", "no files are read here: use mesh_obj".into()));
         }
         _ => return Err(fault("mesh", "one of mesh and mesh_obj is needed".into())),
     };
+    // A scene is simulated as it is written.
+    if obj.dropped > 0 {
+        return Err(fault("mesh", obj.notes.join("; ")));
+    }
+    let mesh = obj.mesh;
     file.check_pins(mesh.vertices().len())
         .map_err(|(field, why)| fault(field, why))?;
     let material = file.material.fabric();

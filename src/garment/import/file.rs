@@ -141,6 +141,7 @@ fn repaired(sewn: SewnObj, path: &Path) -> Result<(SewnObj, Option<f32>), Format
         uv: obj.uv,
         mesh: done.mesh,
         notes,
+        dropped: obj.dropped,
     };
     Ok((SewnObj { obj, stitches }, done.thickness))
 }
@@ -212,7 +213,7 @@ pub fn some_faces(sewn: &SewnObj, faces: &[usize]) -> Option<SewnObj> {
             uv: sewn.obj.uv.clone(),
             face_uv,
             origins: sewn.obj.origins.of_faces(faces.iter().copied()),
-            notes: Vec::new(),
+            ..ObjMesh::default()
         },
         stitches,
     })
@@ -260,7 +261,7 @@ mod tests {
         .expect("split");
         let notes = m.notes.join("; ");
         assert!(
-            notes.contains("1 edge with more than two faces split (line 9 of `b`)"),
+            notes.contains("1 edge with more than two faces split (line 10 of `b`)"),
             "{notes}"
         );
         let parts: Vec<String> = split(&m.sewn)

@@ -1,6 +1,8 @@
 //! Garments from other tools.
 
 pub(crate) mod coarsen;
+#[cfg(test)]
+mod exporter_tests;
 mod file;
 pub(crate) mod garmentcode;
 mod mesh;

@@ -9,12 +9,11 @@ use std::path::Path;
 use std::process::ExitCode;
 use tryon::cloth::BendingResolution;
 use tryon::formats::fabric_json::parse_fabric;
-use tryon::formats::gltf::{GlbMesh, read_glb};
+use tryon::formats::gltf::GlbMesh;
 use tryon::formats::mhclo::read_mhclo;
 use tryon::formats::obj::read_obj;
-use tryon::formats::sewn_obj::read_sewn_obj;
 use tryon::formats::{NpzReader, RECORDING_EXTENSIONS};
-use tryon::garment::import::from_mesh;
+use tryon::garment::import::{MeshFile, from_mesh, read_mesh};
 use tryon::garment::{GarmentKind, GarmentMesh, Material, Triangulation};
 use tryon::geometry::math::P3;
 use tryon::geometry::mesh::{Face, Topology, TriMesh};
@@ -28,15 +27,10 @@ const GREY: [u8; 3] = [180, 180, 180];
 /// The fault of the file, named by field, joint, vertex, face, panel or frame.
 pub(crate) fn run(args: &ImportArgs) -> Result<ExitCode> {
     let path = &args.input;
-    match path.extension().and_then(|e| e.to_str()).unwrap_or("") {
+    let extension = path.extension().and_then(|e| e.to_str()).unwrap_or("");
+    match extension.to_ascii_lowercase().as_str() {
         "npz" if !NpzReader::is_recording(path)? => body(args)?,
-        "obj" => obj(args)?,
-        "glb" | "gltf" => {
-            let g = read_glb(path)?;
-            describe(&g.mesh)?;
-            let vertices = as_garment(args, g.mesh.vertices().to_vec())?;
-            write(args, "garment", &vertices, g.mesh.faces(), &g.uv)?;
-        }
+        "obj" | "glb" | "gltf" => mesh(args)?,
         "json" => json(args)?,
         "mhclo" => clothes(args)?,
         e if e.is_empty() || RECORDING_EXTENSIONS.contains(&e) => {
@@ -99,9 +93,9 @@ fn body(args: &ImportArgs) -> Result<()> {
     write(args, t.name(), m.vertices(), m.faces(), &[])
 }
 
-/// A mesh, with stitches or without.
-fn obj(args: &ImportArgs) -> Result<()> {
-    let sewn = read_sewn_obj(&args.input)?;
+/// A mesh, with stitches or without, repaired.
+fn mesh(args: &ImportArgs) -> Result<()> {
+    let MeshFile { sewn, notes, .. } = read_mesh(&args.input, None)?;
     if !sewn.stitches.is_empty() {
         let cotton = Material::preset("cotton")?;
         let g = from_mesh(&sewn, stem(&args.input), GarmentKind::Dress, cotton)?;
@@ -114,6 +108,11 @@ fn obj(args: &ImportArgs) -> Result<()> {
         );
     }
     describe(&sewn.obj.mesh)?;
+    let parts = sewn.obj.origins.counts();
+    for (part, faces) in parts.iter().filter(|_| parts.len() > 1) {
+        println!("part `{part}`: {faces} faces");
+    }
+    notes.iter().for_each(|note| println!("{note}"));
     let (vertices, uv, faces, _) = sewn.obj.unwelded();
     let vertices = as_garment(args, vertices)?;
     write(args, "garment", &vertices, &faces, &uv)
@@ -166,6 +165,7 @@ fn clothes(args: &ImportArgs) -> Result<()> {
         m.base,
         m.deleted.len()
     );
+    o.notes.iter().for_each(|note| println!("{note}"));
     let (vertices, uv, faces, _) = o.unwelded();
     write(args, &m.name, &vertices, &faces, &uv)
 }

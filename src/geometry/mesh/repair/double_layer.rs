@@ -9,6 +9,7 @@ use crate::math::order_statistics::percentile;
 use crate::math::{P3d, V3d};
 use crate::mesh::MeshRepairSettings;
 use face_grid::FaceGrid;
+use std::collections::HashMap;
 
 mod face_grid;
 
@@ -19,12 +20,30 @@ const FOLD: f64 = -0.5;
 /// Least share of the whole area of a sheet.
 const LEAST_SHEET: f64 = 0.05;
 
-/// Component of a surface, closed, with its normals outward.
+/// Faces of a part that are tested first: most closed parts are no double layers.
+const SAMPLE: usize = 256;
+/// Share of the sample with a face behind, over the share that a double layer needs, below which the part is none.
+const SAMPLE_SHARE: f64 = 0.7;
+
+/// Values of all faces, computed once.
+struct FaceValues {
+    /// Unit normals; zero without area.
+    normal: Vec<V3d>,
+    /// Twice the areas.
+    area: Vec<f64>,
+    /// Centres.
+    centre: Vec<P3d>,
+}
+
+/// Component of a surface, closed.
 struct ClosedPart<'a> {
     surface: &'a WorkingSurface,
     neighbours: &'a [[Option<u32>; 3]],
+    values: &'a FaceValues,
     /// Its faces.
     faces: Vec<u32>,
+    /// 1 if its normals point outward, else −1.
+    outward: f64,
 }
 
 /// Double layer found.
@@ -41,15 +60,17 @@ pub(super) fn thin(
     report: &mut MeshRepairReport,
 ) -> Option<f32> {
     let neighbours = surface.neighbours();
+    let components = closed_components(&neighbours);
+    if components.is_empty() {
+        return None;
+    }
+    let values = FaceValues::new(surface);
     let mut is_dropped = vec![false; surface.faces.len()];
+    let mut is_taken = vec![false; surface.faces.len()];
     let mut thicknesses = Vec::new();
-    for faces in closed_components(&neighbours) {
-        let part = ClosedPart {
-            surface,
-            neighbours: &neighbours,
-            faces,
-        };
-        let Some(found) = part.double_layer(settings) else {
+    for faces in components {
+        let part = ClosedPart::new(surface, &neighbours, &values, faces);
+        let Some(found) = part.double_layer(settings, &mut is_taken) else {
             continue;
         };
         let Some(outer) = found.outer else {
@@ -67,6 +88,41 @@ pub(super) fn thin(
     let mut dropped = is_dropped.into_iter();
     surface.faces.retain(|_| !dropped.next().unwrap_or(false));
     percentile(&mut thicknesses, 50).map(|t| t as f32)
+}
+
+impl FaceValues {
+    fn new(surface: &WorkingSurface) -> Self {
+        let corners =
+            (0..surface.faces.len()).map(|f| surface.positions(f).map(|p| p.cast::<f64>()));
+        let values = corners.map(|[a, b, c]| {
+            let twice = (b - a).cross(&(c - a));
+            let centre = P3d::from((a.coords + b.coords + c.coords) / 3.0);
+            (
+                twice.try_normalize(0.0).unwrap_or_default(),
+                twice.norm(),
+                centre,
+            )
+        });
+        let (mut normal, mut area, mut centre) = (Vec::new(), Vec::new(), Vec::new());
+        for (n, a, c) in values {
+            normal.push(n);
+            area.push(a);
+            centre.push(c);
+        }
+        Self {
+            normal,
+            area,
+            centre,
+        }
+    }
+    /// Cosine between the normals of two faces.
+    fn cosine(&self, f: u32, g: u32) -> f64 {
+        self.normal[f as usize].dot(&self.normal[g as usize])
+    }
+    /// Twice the area of faces.
+    fn area_of(&self, faces: &[u32]) -> f64 {
+        faces.iter().map(|f| self.area[*f as usize]).sum()
+    }
 }
 
 /// Faces of each component without an open edge.
@@ -108,76 +164,99 @@ fn flood(
     own
 }
 
-/// Sum of a value over faces.
-fn sum(faces: &[u32], value: impl Fn(u32) -> f64) -> f64 {
-    faces.iter().map(|f| value(*f)).sum()
-}
-
-impl ClosedPart<'_> {
-    /// The double layer that the part is, if it is one.
-    fn double_layer(&self, settings: &MeshRepairSettings) -> Option<DoubleLayer> {
-        let n = self.surface.faces.len();
-        let corners = |f: u32| self.surface.positions(f as usize).map(|p| p.cast::<f64>());
-        let volume = sum(&self.faces, |f| {
-            let [a, b, c] = corners(f).map(|p| p.coords);
-            a.dot(&b.cross(&c))
-        });
-        let (mut normal, mut area) = (vec![V3d::zeros(); n], vec![0.0; n]);
-        for &f in &self.faces {
-            let [a, b, c] = corners(f);
-            let twice = (b - a).cross(&(c - a)) * volume.signum();
-            area[f as usize] = twice.norm();
-            normal[f as usize] = twice.try_normalize(0.0).unwrap_or_default();
+impl<'a> ClosedPart<'a> {
+    fn new(
+        surface: &'a WorkingSurface,
+        neighbours: &'a [[Option<u32>; 3]],
+        values: &'a FaceValues,
+        faces: Vec<u32>,
+    ) -> Self {
+        let volume: f64 = faces
+            .iter()
+            .map(|f| {
+                let [a, b, c] = surface
+                    .positions(*f as usize)
+                    .map(|p| p.cast::<f64>().coords);
+                a.dot(&b.cross(&c))
+            })
+            .sum();
+        Self {
+            surface,
+            neighbours,
+            values,
+            faces,
+            outward: volume.signum(),
         }
-        let whole = sum(&self.faces, |f| area[f as usize]);
+    }
 
+    /// The double layer that the part is, if it is one. `is_taken` is scratch space of its faces.
+    fn double_layer(
+        &self,
+        settings: &MeshRepairSettings,
+        is_taken: &mut [bool],
+    ) -> Option<DoubleLayer> {
         let reach = f64::from(settings.layer_share) * self.size();
         let grid = FaceGrid::new(self.surface, &self.faces, reach);
-        let mut backing = vec![None; n];
-        for &f in &self.faces {
-            let [a, b, c] = corners(f);
-            let middle = P3d::from((a.coords + b.coords + c.coords) / 3.0);
-            let hit = grid.first_hit(f, &middle, &-normal[f as usize]);
-            let is_opposite = |g: u32| normal[f as usize].dot(&normal[g as usize]) < -SMOOTH;
-            backing[f as usize] = hit.filter(|(g, _)| is_opposite(*g));
-        }
-        let backed = |f: u32| backing[f as usize].is_some();
-        let share = sum(
-            &self.faces,
-            |f| if backed(f) { area[f as usize] } else { 0.0 },
-        );
-        if share < f64::from(settings.layer_least) * whole {
+        let least = f64::from(settings.layer_least);
+        let stride = self.faces.len().div_ceil(SAMPLE);
+        let sample: Vec<u32> = self.faces.iter().step_by(stride).copied().collect();
+        let of_sample = self.backed_share(&sample, |f| self.backing(&grid, f).is_some());
+        if of_sample < SAMPLE_SHARE * least {
             return None;
         }
-        let mut depths: Vec<f64> = self
+
+        let backing = self
             .faces
             .iter()
-            .filter_map(|f| Some(backing[*f as usize]?.1))
-            .collect();
+            .map(|f| Some((*f, self.backing(&grid, *f)?)));
+        let backing: HashMap<u32, (u32, f64)> = backing.flatten().collect();
+        if self.backed_share(&self.faces, |f| backing.contains_key(&f)) < least {
+            return None;
+        }
+        let mut depths: Vec<f64> = backing.values().map(|(_, depth)| *depth).collect();
         let thickness = percentile(&mut depths, 50)?;
 
         let crosses = |f: u32, g: u32| {
-            let cosine = normal[f as usize].dot(&normal[g as usize]);
-            cosine > SMOOTH || (backed(f) && backed(g) && cosine > FOLD)
+            let cosine = self.values.cosine(f, g);
+            let are_backed = || backing.contains_key(&f) && backing.contains_key(&g);
+            cosine > SMOOTH || (cosine > FOLD && are_backed())
         };
-        let mut is_taken = vec![false; n];
-        let seeds = self.faces.iter().filter(|f| backed(**f));
-        let groups = seeds.map(|f| flood(self.neighbours, *f, &mut is_taken, crosses));
-        let area_of = |group: &[u32]| sum(group, |f| area[f as usize]);
-        let mut sheets: Vec<Vec<u32>> = groups
-            .filter(|g| area_of(g) > LEAST_SHEET * whole)
+        let seeds = self.faces.iter().filter(|f| backing.contains_key(*f));
+        let groups = seeds.map(|f| flood(self.neighbours, *f, is_taken, crosses));
+        let smallest = LEAST_SHEET * self.values.area_of(&self.faces);
+        let sheets = groups
+            .filter(|g| self.values.area_of(g) > smallest)
             .collect();
-        let outer = match sheets.as_slice() {
-            [a, b] => {
-                let [x, y] = [a, b].map(|g| area_of(g));
-                let is_pair = x.min(y) > f64::from(settings.layer_alike) * x.max(y);
-                let flux = |g: &[u32]| self.flux(g, &normal, &area);
-                let first = usize::from(flux(b) > flux(a));
-                is_pair.then(|| sheets.swap_remove(first))
-            }
-            _ => None,
+        Some(DoubleLayer {
+            thickness,
+            outer: self.outer(sheets, f64::from(settings.layer_alike)),
+        })
+    }
+
+    /// The outer one of two sheets; `None` unless there are two, the smaller at least `alike` times the larger.
+    fn outer(&self, mut sheets: Vec<Vec<u32>>, alike: f64) -> Option<Vec<u32>> {
+        let [a, b] = sheets.as_slice() else {
+            return None;
         };
-        Some(DoubleLayer { thickness, outer })
+        let [x, y] = [a, b].map(|g| self.values.area_of(g));
+        let first = usize::from(self.flux(b) > self.flux(a));
+        (x.min(y) > alike * x.max(y)).then(|| sheets.swap_remove(first))
+    }
+
+    /// Face of opposite normal close behind a face, and its distance.
+    fn backing(&self, grid: &FaceGrid<'_>, face: u32) -> Option<(u32, f64)> {
+        let (from, normal) = (
+            &self.values.centre[face as usize],
+            self.values.normal[face as usize],
+        );
+        let hit = grid.first_hit(face, from, &(normal * -self.outward));
+        hit.filter(|(other, _)| self.values.cosine(face, *other) < -SMOOTH)
+    }
+
+    /// Share of the area of faces that have a face behind them.
+    fn backed_share(&self, faces: &[u32], is_backed: impl Fn(u32) -> bool) -> f64 {
+        let backed: Vec<u32> = faces.iter().copied().filter(|f| is_backed(*f)).collect();
+        self.values.area_of(&backed) / self.values.area_of(faces).max(f64::MIN_POSITIVE)
     }
 
     /// Longest side of the bounding box.
@@ -193,19 +272,14 @@ impl ClosedPart<'_> {
         bounds.map_or(0.0, |(lo, hi)| f64::from((hi - lo).amax()))
     }
 
-    /// Flow of the field x − middle through faces: positive for the outer sheet of a tube, negative for its inner one.
-    fn flux(&self, faces: &[u32], normal: &[V3d], area: &[f64]) -> f64 {
-        let centre = |f: u32| {
-            let p = self
-                .surface
-                .positions(f as usize)
-                .map(|p| p.cast::<f64>().coords);
-            (p[0] + p[1] + p[2]) / 3.0
+    /// Flow of the field x − middle outward through faces: positive for the outer sheet of a tube, negative for its inner one.
+    fn flux(&self, faces: &[u32]) -> f64 {
+        let centre = |f: &u32| self.values.centre[*f as usize].coords;
+        let middle = self.faces.iter().map(centre).sum::<V3d>() / self.faces.len() as f64;
+        let through = |f: &u32| {
+            let k = *f as usize;
+            self.values.area[k] * self.values.normal[k].dot(&(centre(f) - middle))
         };
-        let count = self.faces.len() as f64;
-        let middle = self.faces.iter().fold(V3d::zeros(), |s, f| s + centre(*f)) / count;
-        sum(faces, |f| {
-            area[f as usize] * normal[f as usize].dot(&(centre(f) - middle))
-        })
+        self.outward * faces.iter().map(through).sum::<f64>()
     }
 }

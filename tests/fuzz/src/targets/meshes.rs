@@ -62,10 +62,19 @@ pub(super) const PLY: Target = Target::new(
      TextureFile",
 );
 
+/// Compressed and deformed meshes by other libraries.
+const EXPORTED: [&str; 5] = [
+    include_str!("../../../../src/garment/testdata/meshes/draco.gltf"),
+    include_str!("../../../../src/garment/testdata/meshes/meshopt.gltf"),
+    include_str!("../../../../src/garment/testdata/meshes/skin.gltf"),
+    include_str!("../../../../src/garment/testdata/meshes/sparse.gltf"),
+    include_str!("../../../../src/garment/testdata/meshes/instances.gltf"),
+];
+
 /// glTF as a garment and as a scan.
 pub(super) const GLTF: Target = Target::new(
     "gltf",
-    "src/formats/gltf/reader.rs, src/formats/scan/gltf.rs",
+    "src/formats/gltf/model.rs, src/formats/scan/gltf.rs",
     |b, scratch| {
         let parts = || pack::glb(b.get("model.json"), b.get("model.bin"));
         let file = packed(b, "model.glb", parts)?;
@@ -79,7 +88,8 @@ pub(super) const GLTF: Target = Target::new(
 .words(
     "POSITION NORMAL TEXCOORD_0 COLOR_0 JOINTS_0 WEIGHTS_0 bufferView byteOffset byteLength \
      byteStride componentType count sparse indices mode uri data:, children matrix node scene \
-     extensions KHR_texture_transform EXT_meshopt_compression",
+     extensions KHR_texture_transform EXT_meshopt_compression KHR_draco_mesh_compression \
+     KHR_mesh_quantization EXT_mesh_gpu_instancing targets weights skin normalized",
 )
 .allow(1 << 20, 60_000);
 
@@ -143,5 +153,7 @@ fn gltf_seeds() -> Vec<Bundle> {
     };
     let glb = encode_glb(&[mesh], &[], 1.0, Path::new("model.glb")).unwrap_or_default();
     let parts = pack::unpack_glb(&glb).unwrap_or_default();
-    vec![Bundle::of("model.glb", glb), parts]
+    let mut seeds = vec![Bundle::of("model.glb", glb), parts];
+    seeds.extend(EXPORTED.map(|text| Bundle::of("model.glb", text)));
+    seeds
 }
