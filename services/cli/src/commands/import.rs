@@ -72,7 +72,7 @@ fn stem(path: &Path) -> &str {
 }
 
 fn body(args: &ImportArgs) -> Result<()> {
-    let t = input::template(Some(&args.input))?;
+    let t = input::template_in(&args.input, &args.frame.stated())?;
     let (m, s) = (t.mesh(), t.skeleton());
     println!(
         "body: {} vertices, {} faces, {} joints, {} angles",
