@@ -13,7 +13,7 @@ use std::collections::HashMap;
 use std::path::Path;
 
 /// Most bytes of an accessor without a buffer view, whose rows are zero.
-const MOST_ZEROS: usize = 256 << 20;
+const MOST_ZEROS: usize = 64 << 20;
 
 /// Accessors of a document.
 pub(super) struct Accessors {

@@ -41,6 +41,8 @@ pub(super) struct SceneReader<'a> {
     base_colors: Option<BaseColors<'a>>,
     world: Vec<Matrix4<f32>>,
     nodes: usize,
+    /// Vertices read, with those that no face uses.
+    read: usize,
     /// Primitives of points or lines.
     flat: usize,
     /// Degenerate triangles.
@@ -71,6 +73,7 @@ impl<'a> SceneReader<'a> {
             base_colors: (purpose == Purpose::Scan).then_some(base_colors),
             world: world_transforms(file),
             nodes: 0,
+            read: 0,
             flat: 0,
             degenerate: 0,
             out: SceneTriangles::default(),
@@ -94,8 +97,10 @@ impl<'a> SceneReader<'a> {
             self.node(&node, &Matrix4::identity(), 0)?;
         }
         let fault = |why: String| Err(FormatError::field(self.path, "meshes", why));
-        if self.out.vertices.len() > MAX_VERTICES {
-            return fault(format!("more than {MAX_VERTICES} vertices"));
+        if self.is_too_large() {
+            return fault(format!(
+                "more than {MAX_VERTICES} vertices or {MAX_NODES} nodes and instances"
+            ));
         }
         if self.out.faces.is_empty() {
             let (nodes, flat) = (self.nodes, self.flat);
@@ -152,6 +157,9 @@ impl<'a> SceneReader<'a> {
                 .name()
                 .map_or_else(|| format!("mesh {index}"), str::to_owned);
             for (k, primitive) in mesh.primitives().enumerate() {
+                if self.is_too_large() {
+                    break;
+                }
                 let material = primitive.material();
                 let placed = PlacedPrimitive {
                     primitive: &primitive,
@@ -175,7 +183,7 @@ impl<'a> SceneReader<'a> {
     }
 
     fn is_too_large(&self) -> bool {
-        self.nodes > MAX_NODES || self.out.vertices.len() > MAX_VERTICES
+        self.nodes > MAX_NODES || self.read > MAX_VERTICES || self.out.vertices.len() > MAX_VERTICES
     }
 
     /// Adds all instances of a primitive.
@@ -190,6 +198,7 @@ impl<'a> SceneReader<'a> {
             return Ok(());
         };
         self.degenerate += shape.degenerate;
+        self.read += shape.vertices.len();
         if self.base_colors.is_none() {
             shape.drop_unused();
         }

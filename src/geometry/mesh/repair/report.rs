@@ -57,12 +57,14 @@ impl MeshRepairReport {
     /// One clause a change; `place` names a face of the given mesh.
     pub fn clauses(&self, place: impl Fn(u32) -> String) -> Vec<String> {
         let at = |finding: &FaceFinding| {
-            let names: Vec<String> = finding.first.iter().map(|f| place(*f)).collect();
+            let mut names: Vec<String> = finding.first.iter().map(|f| place(*f)).collect();
             let more = if finding.count > names.len() {
                 " …"
             } else {
                 ""
             };
+            // Triangles of one polygon have one place.
+            names.dedup();
             format!("({}{more})", names.join(", "))
         };
         let mut out = Vec::new();
