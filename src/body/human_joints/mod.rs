@@ -23,6 +23,8 @@ const ARM_TO_LEG: [f64; 2] = [0.68, 0.15];
 const TRUNK_TO_LEG: [f64; 2] = [0.6, 0.4];
 /// Cost of a tree in which the arms are not below the legs' joint, and of one without a head.
 const MISPLACED: f64 = 2.0;
+/// Pairs of one kind that are tried, the best first; rigs of people have three.
+const MOST_PAIRS: usize = 32;
 /// Cost from which on no person is found: three standard deviations in four ratios.
 const MOST: f64 = 18.0;
 
@@ -137,7 +139,7 @@ impl HumanJoints {
     }
 }
 
-/// Pairs of like chains with a common parent.
+/// Pairs of like chains with a common parent, the best first.
 fn pairs(branches: &Branches<'_>, kind: &limb::LimbKind) -> Vec<LimbPair> {
     let longest = branches.depths.iter().copied().fold(0.0, f64::max);
     let is_long = |c: &&usize| branches.reach(**c) > SHORTEST * longest;
@@ -158,6 +160,8 @@ fn pairs(branches: &Branches<'_>, kind: &limb::LimbKind) -> Vec<LimbPair> {
             }
         }
     }
+    out.sort_by(|a, b| a.cost().total_cmp(&b.cost()));
+    out.truncate(MOST_PAIRS);
     out
 }
 

@@ -5,7 +5,8 @@ use crate::bundle::Bundle;
 use crate::execute::Scratch;
 use crate::pack;
 use std::path::Path;
-use tryon::body::import::template_from_smpl;
+use tryon::body::import::{body_of_arrays, template_from_smpl};
+use tryon::formats::MeshFrame;
 use tryon::formats::mhclo::parse_mhclo;
 use tryon::formats::morph_target::read_morph_target;
 use tryon::formats::npy::read_npy;
@@ -16,11 +17,21 @@ use tryon::geometry::math::P3;
 /// SMPL-layout archives: members packed anew, or a raw archive.
 pub(super) const NPZ: Target = Target::new(
     "npz",
-    "src/formats/npz.rs, src/body/import.rs",
+    "src/formats/npz.rs, amass.rs, src/body/import",
     |b, scratch| {
         let archive = packed(b, "body.npz", || pack::zip(&b.0))?;
         let path = scratch.file("body.npz", &archive)?;
+        // Motions of AMASS come in the same container.
+        if let Ok(clip) = read_motion(&path) {
+            return Ok(clip.frames.len());
+        }
         let arrays = read_smpl(&path).map_err(text)?;
+        // Few inputs are people.
+        drop(body_of_arrays(
+            "body",
+            arrays.clone(),
+            &MeshFrame::default(),
+        ));
         let template = template_from_smpl("body", &arrays).map_err(text)?;
         Ok(template.mesh().vertices().len())
     },
@@ -150,5 +161,8 @@ fn npz_seeds() -> Vec<Bundle> {
         .and("shapedirs.npy", f64s(&[4, 3, 1], &[0.01; 12]))
         .and("posedirs.npy", f64s(&[4, 3, 9], &[0.0; 108]));
     let archive = pack::zip(&bundle.0).unwrap_or_default();
-    vec![Bundle::of("body.npz", archive), bundle]
+    let motion = Bundle::of("poses.npy", f64s(&[1, 72], &[0.1; 72]))
+        .and("trans.npy", f64s(&[1, 3], &[0.5; 3]))
+        .and("mocap_framerate.npy", f64s(&[1], &[30.0]));
+    vec![Bundle::of("body.npz", archive), bundle, motion]
 }
