@@ -9,6 +9,7 @@ use std::time::Duration;
 use tryon::body::{Template, embedded, import::template_from_smpl};
 use tryon::dressing::{MeshGarment, MeshGarmentSettings, SourceBody};
 use tryon::formats::fabric_json::parse_fabric;
+use tryon::formats::foreign_pattern::{is_foreign_pattern, refuse_foreign_pattern};
 use tryon::formats::garmentcode::{is_garmentcode, parse_garmentcode};
 use tryon::formats::npz::read_smpl;
 use tryon::garment::import::from_garmentcode;
@@ -37,8 +38,10 @@ pub(crate) fn template(path: Option<&Path>) -> Result<Arc<Template>> {
 /// # Errors
 /// Names the file and the panel, edge or seam at fault.
 pub(crate) fn pattern(path: &Path) -> Result<Pattern> {
+    let bytes = std::fs::read(path).with_context(|| format!("cannot read {}", path.display()))?;
+    refuse_foreign_pattern(&bytes, path)?;
     let text =
-        std::fs::read_to_string(path).with_context(|| format!("cannot read {}", path.display()))?;
+        String::from_utf8(bytes).with_context(|| format!("{} is no text", path.display()))?;
     let name = path
         .file_stem()
         .and_then(|s| s.to_str())
@@ -75,7 +78,7 @@ pub(crate) fn choices(names: &[String], given: &GivenChoice<'_>) -> Result<Vec<C
         if let Some((folder, own)) = capture(path) {
             let garments = captured_garments(folder, own, material)?;
             chosen.extend(garments.into_iter().map(|g| Choice::mesh(g, size)));
-        } else if name.ends_with(".json") {
+        } else if name.ends_with(".json") || is_foreign_pattern(path) {
             chosen.push(Choice::Pattern(Box::new(pattern(path)?)));
         } else if is_mesh(path) {
             chosen.push(Choice::mesh(
