@@ -18,6 +18,12 @@ settings! {
         pub figure_middle: f64 = 0.32,
         /// Height of a panel's top above the waist from which it covers more than waist and hips, metres: waistbands end at it.
         pub above_waist: f64 = 0.06,
+        /// Lowest chest and highest waist of figures from 1.5 to 2 m, metres: in between a panel's top may be either.
+        pub lowest_chest: f64 = 1.1,
+        /// Height of the waist of a figure of 2 m, metres.
+        pub highest_waist: f64 = 1.28,
+        /// Least width of a panel whose top is the shoulder, metres: lapels are narrower.
+        pub trunk_width: f64 = 0.12,
         /// Height of a panel's top above the shoulder, or of its foot below, from which it stands on the neckline, metres.
         pub above_shoulder: f64 = 0.018,
         /// Least distances of a sleeve and of its middle from the sagittal plane, metres.
@@ -28,7 +34,7 @@ settings! {
         pub leg_over_middle: f64 = 0.06,
         /// Least share of a hood's normal that points to the side.
         pub sideways: f64 = 0.8,
-        /// Least height of a hood, metres: less is a collar.
+        /// Least height of a hood and of a trunk, metres: less is a collar.
         pub hood_height: f64 = 0.2,
         /// Least distance of a panel from the body's plane that tells front and back, metres.
         pub least_depth: f64 = 0.02,

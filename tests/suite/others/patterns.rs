@@ -14,7 +14,7 @@ use tryon::garment::import::from_garmentcode;
 use tryon::garment::{GarmentKind, Material, Pattern, Placement, Side, Size};
 
 /// Turns that openings of the garment far off the bone, a neckline or a hem, add at most.
-const OPEN: f64 = 0.1;
+const OPEN: f64 = 0.25;
 
 fn import(text: &str, name: &str) -> Result<Pattern, String> {
     let raw = parse_garmentcode(text, Path::new(name)).map_err(|e| e.to_string())?;

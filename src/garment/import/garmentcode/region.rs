@@ -32,7 +32,9 @@ pub(super) fn regions(
             "it is sewn to no panel: stitch it, or leave it out",
         ));
     }
-    let mut found: Vec<Option<CoveredPart>> = panels.iter().map(|p| upper(p, settings)).collect();
+    let figure = FigureHeights::of(panels, settings);
+    let upper = |p| upper(p, &figure, settings);
+    let mut found: Vec<Option<CoveredPart>> = panels.iter().map(upper).collect();
     spread_arms(panels, &mut found);
     let lower = |(k, r): (usize, Option<CoveredPart>)| {
         r.unwrap_or_else(|| {
@@ -50,14 +52,67 @@ pub(super) fn regions(
     Ok(out)
 }
 
+/// Heights of the figure that a pattern is drawn around, metres.
+struct FigureHeights {
+    /// Height over which a panel's top is above the waist.
+    above_waist: f64,
+    /// High point of the shoulder.
+    shoulder: f64,
+    /// True if the pattern's trunk gives them.
+    is_measured: bool,
+}
+
+impl FigureHeights {
+    /// From the highest large panel before or behind the body, if it is above any waist.
+    fn of(panels: &[DrawnPanel<'_>], settings: &ImportSettings) -> Self {
+        let trunk = panels.iter().filter(|p| {
+            let [width, height] = [p.x[1] - p.x[0], p.high - p.low];
+            let is_large = width > settings.trunk_width && height > settings.hood_height;
+            let faces = p.normal.z.abs() > settings.sideways;
+            is_large && faces && p.off_middle() < settings.arm_gap
+        });
+        let top = trunk.map(|p| p.high).fold(f64::MIN, f64::max);
+        let is_measured = top > settings.highest_waist;
+        let shoulder = if is_measured {
+            top
+        } else {
+            settings.figure_shoulder
+        };
+        let waist = shoulder * settings.figure_waist / settings.figure_shoulder;
+        Self {
+            above_waist: waist + settings.above_waist,
+            shoulder,
+            is_measured,
+        }
+    }
+    /// True for a panel that ends above the waist. Between the waist of a tall figure and the chest of a short one its name
+    /// tells.
+    fn is_above_waist(&self, p: &DrawnPanel<'_>, settings: &ImportSettings) -> bool {
+        let above = p.high > self.above_waist;
+        let name = p.raw.name.to_lowercase();
+        let named = |words: &[&str]| words.iter().any(|w| name.contains(w));
+        if self.is_measured || p.high < settings.lowest_chest {
+            above
+        } else if named(&["skirt", "pant", "wb", "waist", "leg"]) {
+            false
+        } else {
+            above || named(&["torso", "bodice", "top", "shirt"])
+        }
+    }
+}
+
 /// Region of a panel above the waist; `None` below it.
-fn upper(p: &DrawnPanel<'_>, settings: &ImportSettings) -> Option<CoveredPart> {
-    let above_waist = p.high > settings.figure_waist + settings.above_waist;
+fn upper(
+    p: &DrawnPanel<'_>,
+    figure: &FigureHeights,
+    settings: &ImportSettings,
+) -> Option<CoveredPart> {
+    let above_waist = figure.is_above_waist(p, settings);
     if above_waist && p.off_middle() > settings.arm_gap && p.centre.x.abs() > settings.arm_middle {
         return Some(CoveredPart::Arm(p.side()));
     }
-    let shoulder = settings.figure_shoulder;
-    if p.high > shoulder + settings.above_shoulder || p.low > shoulder - settings.above_shoulder {
+    let (shoulder, near) = (figure.shoulder, settings.above_shoulder);
+    if p.high > shoulder + near || p.low > shoulder - near {
         let sideways = p.normal.x.abs() > settings.sideways;
         let is_hood = sideways && p.high - p.low > settings.hood_height;
         return Some(if is_hood {
