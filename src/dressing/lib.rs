@@ -30,7 +30,7 @@
 //! - The order of it: [`mod@dress`].
 //! - Size recommended, with its reason: [`mod@suggest`], from the measures in [`mod@finished`].
 //! - Panels around trunk, legs, arms, head: [`mod@place::trunk`], [`mod@place::leg`], [`mod@place::sleeve`],
-//!   [`mod@place::hood`].
+//!   [`mod@place::hood`]; skirts of any panels [`mod@place::hip_tube`], collars [`mod@place::collar`].
 //! - Sewing: [`mod@sew`].
 //! - First drape: [`mod@drape`].
 //! - Stretch, pressure, gaps: [`mod@fit_map`].

@@ -228,7 +228,7 @@ fn misfit(finished: &FinishedGarment, body: &Measurements) -> Option<Misfit> {
         });
     }
     let (body, girth) = (body.hip, finished.girths[1]);
-    (held && girth > body).then_some(Misfit::TooLarge {
+    (held && girth > body + finished.settings.held_by_button).then_some(Misfit::TooLarge {
         garment,
         size,
         body,

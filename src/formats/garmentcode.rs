@@ -48,13 +48,22 @@ pub struct RawPanel {
     pub edges: Vec<RawEdge>,
 }
 
+/// Two edges that are sewn together.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct RawStitch {
+    /// `(panel, edge)` numbers of both.
+    pub sides: [(usize, usize); 2],
+    /// The right side of one fabric meets the wrong side of the other: the edges run the same way (`right_wrong`).
+    pub wrong_side: bool,
+}
+
 /// Sewing pattern.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RawPattern {
     /// Panels sorted by name.
     pub panels: Vec<RawPanel>,
-    /// Pairs of `(panel, edge)` numbers that are sewn together.
-    pub stitches: Vec<[(usize, usize); 2]>,
+    /// Seams.
+    pub stitches: Vec<RawStitch>,
 }
 
 #[derive(Deserialize)]
@@ -136,19 +145,30 @@ pub fn parse_garmentcode(text: &str, origin: &Path) -> Result<RawPattern, Format
     Ok(RawPattern { panels, stitches })
 }
 
-/// Panel and edge of both sides of stitch `k`. A third entry, the sides of the fabric that meet, is ignored.
+/// Stitch `k`: panel and edge of both sides, and as a third entry `right_wrong` where the sides of the fabric differ.
 fn stitch(
     k: usize,
     sides: Vec<Value>,
     panels: &[RawPanel],
     origin: &Path,
-) -> Result<[(usize, usize); 2], FormatError> {
+) -> Result<RawStitch, FormatError> {
     let fault = |what: &str, why: String| {
         FormatError::field(origin, format!("pattern.stitches[{k}]{what}"), why)
     };
     if sides.len() < 2 {
         return Err(fault("", format!("{} sides; 2 are sewn", sides.len())));
     }
+    let wrong_side = match sides.get(2).map(Value::as_str) {
+        None | Some(Some("right_right" | "")) => false,
+        Some(Some("right_wrong")) => true,
+        Some(_) => {
+            let why = format!(
+                "{} is no pair of fabric sides; `right_wrong` is known",
+                sides[2]
+            );
+            return Err(fault("[2]", why));
+        }
+    };
     let mut pair = [(0, 0); 2];
     for (i, (slot, side)) in pair.iter_mut().zip(sides).enumerate() {
         let at = |why: String| fault(&format!("[{i}]"), why);
@@ -164,7 +184,10 @@ fn stitch(
         }
         *slot = (p, s.edge);
     }
-    Ok(pair)
+    Ok(RawStitch {
+        sides: pair,
+        wrong_side,
+    })
 }
 
 fn panel(name: String, p: JsonPanel, units: f64, origin: &Path) -> Result<RawPanel, FormatError> {
@@ -291,7 +314,11 @@ mod tests {
             RawCurve::Circle(0.3, false, true)
         );
         assert_eq!(p.panels[0].edges[2].curve, RawCurve::Quadratic([0.5, 0.1]));
-        assert_eq!(p.stitches, [[(0, 1), (0, 3)]]);
+        let sewn = RawStitch {
+            sides: [(0, 1), (0, 3)],
+            wrong_side: false,
+        };
+        assert_eq!(p.stitches, [sewn]);
         assert!(is_garmentcode(SQUARE) && !is_garmentcode("{}"));
     }
 

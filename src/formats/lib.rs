@@ -6,6 +6,8 @@
 //!
 //! - Bodies in SMPL's layout: [`mod@npz`], `src/body/import.rs`.
 //!
+//! Patterns of other programs: [`mod@garmentcode`]; refused: [`mod@foreign_pattern`].
+//!
 //! Camera and files:
 //!
 //! - Recordings: [`mod@recording`], [`mod@rgbd_folder`], [`mod@k4a_file`], [`mod@r3d_file`], [`mod@npz_recording`];
@@ -31,6 +33,7 @@ mod depth_metres;
 mod error;
 pub mod fabric_json;
 mod face_origins;
+pub mod foreign_pattern;
 mod foxglove;
 pub mod garmentcode;
 pub mod gltf;

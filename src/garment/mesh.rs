@@ -54,7 +54,7 @@ impl Region {
             | Placement::TrunkBack
             | Placement::SkirtFront
             | Placement::SkirtBack => Self::TRUNK.with(Self::LEFT_LEG).with(Self::RIGHT_LEG),
-            Placement::Hood(_) => Self::TRUNK,
+            Placement::Hood(_) | Placement::Collar => Self::TRUNK,
             Placement::Sleeve(Side::Left) => Self::LEFT_ARM,
             Placement::Sleeve(Side::Right) => Self::RIGHT_ARM,
             Placement::LegFront(Side::Left) | Placement::LegBack(Side::Left) => {

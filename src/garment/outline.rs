@@ -10,6 +10,26 @@ pub enum Curve {
     Line,
     /// Cubic Bézier with these two inner control points, panel coordinates, metres.
     Cubic([f64; 2], [f64; 2]),
+    /// Circular arc through this point halfway along it, panel coordinates, metres.
+    Arc([f64; 2]),
+}
+
+impl Curve {
+    /// The curve run the other way.
+    pub fn reversed(self) -> Self {
+        match self {
+            Self::Cubic(a, b) => Self::Cubic(b, a),
+            Self::Line | Self::Arc(_) => self,
+        }
+    }
+    /// The curve with its points mapped by a similarity.
+    pub fn mapped(self, map: impl Fn([f64; 2]) -> [f64; 2]) -> Self {
+        match self {
+            Self::Line => self,
+            Self::Cubic(a, b) => Self::Cubic(map(a), map(b)),
+            Self::Arc(m) => Self::Arc(map(m)),
+        }
+    }
 }
 
 /// One edge of a panel; it ends where the next one starts.
@@ -38,6 +58,7 @@ impl PanelEdge {
                         + t * t * t * to[d]
                 })
             }
+            Curve::Arc(middle) => arc_point(self.from, middle, to, t),
         }
     }
     /// Arc length, metres, by fine sampling.
@@ -71,6 +92,31 @@ impl PanelEdge {
     }
 }
 
+/// Point at share `t` of the circular arc from `a` over `m`, halfway along it, to `b`.
+fn arc_point(a: [f64; 2], m: [f64; 2], b: [f64; 2], t: f64) -> [f64; 2] {
+    let chord = [b[0] - a[0], b[1] - a[1]];
+    let half = 0.5 * chord[0].hypot(chord[1]);
+    let rise = [m[0] - 0.5 * (a[0] + b[0]), m[1] - 0.5 * (a[1] + b[1])];
+    let sagitta = rise[0].hypot(rise[1]);
+    // A quarter of the arc's angle at the centre is the angle between the chord and the line to its middle.
+    let quarter = sagitta.atan2(half);
+    let turn = 4.0 * quarter;
+    let radius = (half * half + sagitta * sagitta) / (2.0 * sagitta);
+    if !(radius.is_finite() && radius < STRAIGHT_ARC * half) {
+        return std::array::from_fn(|d| a[d] + chord[d] * t);
+    }
+    // Unit vectors from the centre to the middle of the arc, and along the chord.
+    let (out, along) = (
+        rise.map(|c| c / sagitta),
+        chord.map(|c| 0.5 * c / half.max(f64::MIN_POSITIVE)),
+    );
+    let (sin, cos) = ((t - 0.5) * turn).sin_cos();
+    std::array::from_fn(|d| m[d] + radius * ((cos - 1.0) * out[d] + sin * along[d]))
+}
+
+/// Radius over half the chord from which an arc is straight: its sagitta is below rounding.
+const STRAIGHT_ARC: f64 = 1e9;
+
 /// Arc length up to each point, metres.
 fn arc_lengths(points: &[[f64; 2]]) -> Vec<f64> {
     let mut along = vec![0.0];
@@ -83,6 +129,27 @@ fn arc_lengths(points: &[[f64; 2]]) -> Vec<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn arcs_of_all_angles_keep_their_radius_and_length() {
+        for turn in [0.1, 1.0, std::f64::consts::PI, 5.0, 6.1] {
+            let on = |angle: f64| [3.0 + 2.0 * f64::cos(angle), 1.0 + 2.0 * f64::sin(angle)];
+            let e = PanelEdge {
+                name: "a".into(),
+                from: on(0.4),
+                curve: Curve::Arc(on(0.4 + 0.5 * turn)),
+            };
+            let to = on(0.4 + turn);
+            for t in [0.0, 0.2, 0.5, 0.9, 1.0] {
+                let (p, q) = (e.at(to, t), on(0.4 + t * turn));
+                assert!(
+                    (p[0] - q[0]).hypot(p[1] - q[1]) < 1e-9,
+                    "{turn} {t}: {p:?} {q:?}"
+                );
+            }
+            assert!((e.length(to) - 2.0 * turn).abs() < 2e-3 * turn);
+        }
+    }
 
     #[test]
     fn bezier_quarter_circles_have_their_length() {

@@ -50,6 +50,8 @@ pub enum Placement {
     /// Half of a hood: y = 0 at the high point of the shoulder; x = 0 at the nape, running to the face on the right
     /// half and away from it on the left.
     Hood(Side),
+    /// Stands on the neckline that it is sewn to. Any coordinates.
+    Collar,
 }
 
 /// Flat piece of cloth.
@@ -60,6 +62,11 @@ pub struct Panel {
     pub name: String,
     /// Place on the body.
     pub placement: Placement,
+    /// Part of the turn around its body part that its rows cover, from their lowest to their highest x, radians. Around the
+    /// hips 0 is in front and π/2 on the left; around an arm 0 is on top, as in the placement. Without it the placement says
+    /// it; a panel around the hips beside others that have one is an insert between them.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub sector: Option<[f64; 2]>,
     /// Closed outline, counter-clockwise seen from outside.
     pub edges: Vec<PanelEdge>,
 }
@@ -194,6 +201,15 @@ impl Pattern {
             });
         }
         for (i, p) in self.panels.iter().enumerate() {
+            if let Some(s) = p
+                .sector
+                .filter(|[a, b]| !(b - a > 0.0 && b - a <= WHOLE_TURN))
+            {
+                return Err(GarmentError::Panel {
+                    panel: p.name.clone(),
+                    why: format!("its sector {s:?} is no part of a turn (radians)"),
+                });
+            }
             if self.panels[..i].iter().any(|o| o.name == p.name) {
                 return Err(GarmentError::Panel {
                     panel: p.name.clone(),
@@ -287,6 +303,8 @@ fn missing(reference: &[String; 2]) -> String {
 
 /// Largest relative difference between the two sides of a dart: more puckers.
 const DART_MISMATCH: f64 = 0.05;
+/// Largest sector, radians.
+const WHOLE_TURN: f64 = std::f64::consts::TAU;
 /// Shortest edge, metres: below it two corners are the same stitch.
 const SHORTEST_EDGE: f64 = 1e-3;
 /// Segments of a curved edge in the crossing test.

@@ -12,6 +12,7 @@ use tryon::dressing::{
 };
 use tryon::formats::MeshFrame;
 use tryon::formats::fabric_json::parse_fabric;
+use tryon::formats::foreign_pattern::{is_foreign_pattern, refuse_foreign_pattern};
 use tryon::formats::garmentcode::{is_garmentcode, parse_garmentcode};
 use tryon::garment::import::from_garmentcode;
 use tryon::garment::{FabricSample, Material, Pattern, Size, Triangulation};
@@ -45,8 +46,10 @@ pub(crate) fn template_in(path: &Path, frame: &MeshFrame) -> Result<Arc<Template
 /// # Errors
 /// Names the file and the panel, edge or seam at fault.
 pub(crate) fn pattern(path: &Path) -> Result<Pattern> {
+    let bytes = std::fs::read(path).with_context(|| format!("cannot read {}", path.display()))?;
+    refuse_foreign_pattern(&bytes, path)?;
     let text =
-        std::fs::read_to_string(path).with_context(|| format!("cannot read {}", path.display()))?;
+        String::from_utf8(bytes).with_context(|| format!("{} is no text", path.display()))?;
     let name = path
         .file_stem()
         .and_then(|s| s.to_str())
@@ -91,7 +94,7 @@ pub(crate) fn choices(names: &[String], given: &GivenChoice<'_>) -> Result<Vec<C
         if let Some((folder, own)) = capture(path) {
             let garments = captured_garments(folder, own, material)?;
             chosen.extend(garments.into_iter().map(|g| Choice::mesh(g, size)));
-        } else if name.ends_with(".json") {
+        } else if name.ends_with(".json") || is_foreign_pattern(path) {
             chosen.push(Choice::Pattern(Box::new(pattern(path)?)));
         } else if is_mesh(path) {
             chosen.push(Choice::mesh(

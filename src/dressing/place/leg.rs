@@ -31,20 +31,15 @@ pub(super) struct LegChart<'a> {
 
 impl<'a> LegChart<'a> {
     pub(super) fn new(body: &PlacedBody<'a>, panel: &Panel, side: Side, front: bool) -> Self {
-        let higher = |name: &str, default: f64| {
-            ends(panel, name).map_or(default, |[a, b]| a[1].max(b[1])) as f32
-        };
-        let rise = higher("inseam", DEFAULT_RISE);
-        let heights = &body.sections.heights;
         let outline = PanelOutline::of(panel);
         Self {
             sections: body.sections,
             settings: body.settings,
             side,
             front,
-            waist: (heights.fork - CROTCH_CLEARANCE as f32 - rise).min(heights.waist),
-            rise,
-            hip_line: higher("crotch", body.settings.leg.default_hip_line),
+            waist: leg_waist(body),
+            rise: landmark(body, panel, "inseam", DEFAULT_RISE),
+            hip_line: landmark(body, panel, "crotch", body.settings.leg.default_hip_line),
             half: outline.half_width(),
             outline,
         }
@@ -80,4 +75,22 @@ impl<'a> LegChart<'a> {
         // Each trouser leg stays on its own side where the thighs touch.
         P3::new(left * (left * mix(0)).max(settings.inseam_gap), y, mix(1))
     }
+}
+
+/// Height of y = 0 of trouser panels: their crotch is at the body's, or their waist is.
+pub(super) fn leg_waist(body: &PlacedBody<'_>) -> f32 {
+    let heights = &body.sections.heights;
+    let mut panels = body.pattern.panels.iter();
+    let rise = panels.find_map(|p| ends(p, "inseam"));
+    let rise = rise.map_or(DEFAULT_RISE, |[a, b]| a[1].max(b[1])) as f32;
+    (heights.fork - CROTCH_CLEARANCE as f32 - rise).min(heights.waist)
+}
+
+/// Height of the upper end of a landmark edge of a panel; of a cuff, of the panel on the same place that has it.
+fn landmark(body: &PlacedBody<'_>, panel: &Panel, name: &str, default: f64) -> f32 {
+    let panels = body.pattern.panels.iter();
+    let others = panels.filter(|p| p.placement == panel.placement);
+    let mut found = std::iter::once(panel).chain(others);
+    let edge = found.find_map(|p| ends(p, name));
+    edge.map_or(default, |[a, b]| a[1].max(b[1])) as f32
 }

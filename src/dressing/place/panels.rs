@@ -1,5 +1,7 @@
 //! Panels to space: one chart a panel, averaged along seams.
 
+use super::collar::stand_collars;
+use super::hip_tube::HipTube;
 use super::hood::HoodChart;
 use super::leg::LegChart;
 use super::placed_body::PlacedBody;
@@ -17,16 +19,25 @@ pub(crate) fn place(body: &PlacedBody<'_>, mesh: &GarmentMesh) -> Vec<P3> {
         .iter()
         .map(|p| PanelChart::new(body, p))
         .collect();
-    mesh.corners
-        .iter()
-        .map(|c| {
-            let sum = c.iter().fold(V3::zeros(), |s, (panel, q)| {
-                let q = [q[0] as f32, q[1] as f32];
-                s + charts[usize::from(*panel)].point(q).coords
-            });
-            P3::from(sum / c.len() as f32)
-        })
-        .collect()
+    let hips = HipTube::new(body, mesh);
+    let at = |vertex: usize, panel: u16, q: [f64; 2]| {
+        let on_tube = hips.as_ref().and_then(|h| h.point(panel, vertex));
+        on_tube.or_else(|| charts[usize::from(panel)].point(q.map(|c| c as f32)))
+    };
+    let (mut positions, mut placed) = (
+        vec![P3::origin(); mesh.vertices],
+        vec![false; mesh.vertices],
+    );
+    for (v, corners) in mesh.corners.iter().enumerate() {
+        let points = corners.iter().filter_map(|(panel, q)| at(v, *panel, *q));
+        let (sum, n) = points.fold((V3::zeros(), 0.0), |(s, n), p| (s + p.coords, n + 1.0));
+        if n > 0.0 {
+            positions[v] = P3::from(sum / n);
+            placed[v] = true;
+        }
+    }
+    stand_collars(mesh, &placed, &mut positions);
+    positions
 }
 
 /// Map from one flat panel to space.
@@ -36,6 +47,8 @@ enum PanelChart<'a> {
     Hood(HoodChart),
     Leg(LegChart<'a>),
     Sleeve(SleeveChart),
+    /// Stands on its neighbours.
+    Collar,
 }
 
 impl<'a> PanelChart<'a> {
@@ -49,17 +62,19 @@ impl<'a> PanelChart<'a> {
             Placement::LegFront(side) => Self::Leg(LegChart::new(body, panel, side, true)),
             Placement::LegBack(side) => Self::Leg(LegChart::new(body, panel, side, false)),
             Placement::Sleeve(side) => Self::Sleeve(SleeveChart::new(body, panel, side)),
+            Placement::Collar => Self::Collar,
         }
     }
-    /// Panel coordinates (x, y) (m) to the frame of the canonical body (m).
-    fn point(&self, p: [f32; 2]) -> P3 {
-        match self {
+    /// Panel coordinates (x, y) (m) to the frame of the canonical body (m); `None` for a panel that stands on others.
+    fn point(&self, p: [f32; 2]) -> Option<P3> {
+        Some(match self {
             Self::Trunk(c) => c.point(p),
             Self::Skirt(c) => c.point(p),
             Self::Hood(c) => c.point(p),
             Self::Leg(c) => c.point(p),
             Self::Sleeve(c) => c.point(p),
-        }
+            Self::Collar => return None,
+        })
     }
 }
 
@@ -93,7 +108,10 @@ mod tests {
             let panels = pattern.panels.iter();
             let charts: Vec<_> = panels.map(|p| PanelChart::new(&body, p)).collect();
             let gap = |c: &Vec<(u16, [f64; 2])>| {
-                let at = |k: usize| charts[usize::from(c[k].0)].point(c[k].1.map(|q| q as f32));
+                let at = |k: usize| {
+                    let chart = &charts[usize::from(c[k].0)];
+                    chart.point(c[k].1.map(|q| q as f32)).expect("a place")
+                };
                 (1..c.len())
                     .map(|k| (at(k) - at(0)).norm())
                     .fold(0.0, f32::max)

@@ -95,7 +95,7 @@ impl<'a> SkirtChart<'a> {
 }
 
 /// Height of a waistband of this girth: the waist, or lower where the hip becomes as wide as the band, metres.
-fn waist_height(body: &PlacedBody<'_>, girth: f32) -> f32 {
+pub(super) fn waist_height(body: &PlacedBody<'_>, girth: f32) -> f32 {
     let sections = body.sections;
     let settings = &body.settings.skirt;
     let mut waist = sections.heights.waist;

@@ -22,6 +22,8 @@ pub(super) struct SleeveChart {
     /// Half width of the panel and the height where it has it: above is the cap.
     bicep: f32,
     cap: f32,
+    /// Part of the turn that a cuff covers, from 0 on top of the arm.
+    sector: Option<[f32; 2]>,
 }
 
 impl SleeveChart {
@@ -47,6 +49,7 @@ impl SleeveChart {
             start,
             bicep,
             cap,
+            sector: panel.sector.map(|s| s.map(|a| a as f32)),
         }
     }
     pub(super) fn point(&self, p: [f32; 2]) -> P3 {
@@ -68,12 +71,20 @@ impl SleeveChart {
         } else {
             u.cross(&front)
         };
+        let row = self.outline.span(p[1]);
+        let (angle, half) = match self.sector {
+            None => (PI * p[0] / half, half),
+            Some([from, to]) => {
+                let width = (row[1] - row[0]).max(self.arm.settings.least_half);
+                let share = ((p[0] - row[0]) / width).clamp(0.0, 1.0);
+                (from + (to - from) * share, PI * width / (to - from))
+            }
+        };
         // At least the round tube of the sleeve's girth.
         let r = self
             .arm
             .radius_at(s)
             .map(|r| (r + self.clearance).max(half / PI));
-        let angle = PI * p[0] / half;
         centre + up * (r[0] * angle.cos()) + front * (-sign(self.side) * r[1] * angle.sin())
     }
 }

@@ -11,6 +11,8 @@ settings! {
         pub loose: f64 = 0.14,
         /// Girth that a waistband may lack, metres: it sits lower, or its button moves.
         pub sits_lower: f64 = 0.03,
+        /// Girth by which a waistband may be wider than the hips, metres: its button moves. Wider ones slide off.
+        pub held_by_button: f64 = 0.02,
         /// Hem height from which trousers are shorts, metres.
         pub shorts: f64 = 0.25,
     }

@@ -15,6 +15,7 @@ pub(super) fn panel(name: &str, placement: Placement, edges: &[DraftEdge<'_>]) -
     Panel {
         name: name.to_owned(),
         placement,
+        sector: None,
         edges: edges
             .iter()
             .map(|(n, from, curve)| PanelEdge {
@@ -34,15 +35,13 @@ pub(super) fn mirrored(p: &Panel, name: &str, placement: Placement) -> Panel {
         .map(|i| PanelEdge {
             name: p.edges[i].name.clone(),
             from: flip(p.end(i)),
-            curve: match p.edges[i].curve {
-                Curve::Line => Curve::Line,
-                Curve::Cubic(a, b) => Curve::Cubic(flip(b), flip(a)),
-            },
+            curve: p.edges[i].curve.mapped(flip).reversed(),
         })
         .collect();
     Panel {
         name: name.to_owned(),
         placement,
+        sector: None,
         edges,
     }
 }

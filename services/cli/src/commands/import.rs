@@ -9,6 +9,7 @@ use std::path::Path;
 use std::process::ExitCode;
 use tryon::cloth::BendingResolution;
 use tryon::formats::fabric_json::parse_fabric;
+use tryon::formats::foreign_pattern::is_foreign_pattern;
 use tryon::formats::gltf::GlbMesh;
 use tryon::formats::mhclo::read_mhclo;
 use tryon::formats::obj::read_obj;
@@ -33,6 +34,9 @@ pub(crate) fn run(args: &ImportArgs) -> Result<ExitCode> {
         "obj" | "glb" | "gltf" => mesh(args)?,
         "json" => json(args)?,
         "mhclo" => clothes(args)?,
+        _ if is_foreign_pattern(path) => {
+            input::pattern(path)?;
+        }
         e if e.is_empty() || RECORDING_EXTENSIONS.contains(&e) => {
             convert(path, &args.recording, args.out.as_deref())?;
         }

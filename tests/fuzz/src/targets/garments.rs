@@ -29,7 +29,7 @@ pub(super) const FABRIC: Target = Target::new(
 /// GarmentCode's patterns.
 pub(super) const GARMENTCODE: Target = Target::new(
     "garmentcode",
-    "src/formats/garmentcode.rs, src/garment/import/garmentcode.rs",
+    "src/formats/garmentcode.rs, src/garment/import/garmentcode/",
     |b, _| {
         let json = lossy(b.first());
         let _ = is_garmentcode(&json);
