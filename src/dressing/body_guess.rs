@@ -10,7 +10,7 @@ use tryon_geometry::math::{Body, P3, Rigid, V3, World, log_so3};
 pub(super) type Guess = [f64; 4];
 
 /// A body that may have worn a garment.
-pub(super) struct Wearer<'a> {
+pub(super) struct TriedBody<'a> {
     pub(super) settings: &'a GuessSettings,
     template: &'a Template,
     rest: RestBody,
@@ -19,7 +19,7 @@ pub(super) struct Wearer<'a> {
     is_free: bool,
 }
 
-impl<'a> Wearer<'a> {
+impl<'a> TriedBody<'a> {
     pub(super) fn new(template: &'a Template, is_free: bool, settings: &'a GuessSettings) -> Self {
         let rest = template.personalise(&BodyShape::default());
         Self {
@@ -58,7 +58,7 @@ impl<'a> Wearer<'a> {
         bones.joints.iter_mut().for_each(|p| *p *= scale);
         (out, bones)
     }
-    /// Search of the skin of [`Wearer::stand`].
+    /// Search of the skin of [`TriedBody::stand`].
     pub(super) fn skin<'s>(&'s self, vertices: &'s [P3]) -> SkinSearch<'s> {
         SkinSearch::new(self.template, vertices, 0.0)
     }
@@ -109,7 +109,7 @@ impl GarmentSamples {
         }
     }
     /// Mean distance of the cloth from its height over a skin, metres; saturated.
-    pub(super) fn distance(&self, wearer: &Wearer<'_>, skin: &SkinSearch<'_>, q: &Guess) -> f32 {
+    pub(super) fn distance(&self, wearer: &TriedBody<'_>, skin: &SkinSearch<'_>, q: &Guess) -> f32 {
         let s = wearer.settings;
         let shift = V3::new(0.0, q[2] as f32, q[3] as f32);
         let distance = |p: &P3| {
@@ -127,12 +127,12 @@ impl GarmentSamples {
         sum / self.points.len().max(1) as f32
     }
     /// Distance plus prior, metres.
-    pub(super) fn cost(&self, wearer: &Wearer<'_>, q: &Guess) -> f32 {
+    pub(super) fn cost(&self, wearer: &TriedBody<'_>, q: &Guess) -> f32 {
         let (vertices, _) = wearer.stand(q);
         self.distance(wearer, &wearer.skin(&vertices), q) + prior(wearer, q)
     }
     /// Coordinate descent with halved steps: least cost and its guess.
-    pub(super) fn minimise(&self, wearer: &Wearer<'_>, start: Guess) -> (f32, Guess) {
+    pub(super) fn minimise(&self, wearer: &TriedBody<'_>, start: Guess) -> (f32, Guess) {
         let settings = wearer.settings;
         let mut best = (self.cost(wearer, &start), start);
         let mut step = settings.steps;
@@ -163,7 +163,7 @@ impl GarmentSamples {
 }
 
 /// Price of an unusual guess, metres: a short body in a loose garment costs as little as a tall one in a tight one.
-pub(super) fn prior(wearer: &Wearer<'_>, q: &Guess) -> f32 {
+pub(super) fn prior(wearer: &TriedBody<'_>, q: &Guess) -> f32 {
     let s = wearer.settings;
     // Files have the floor at zero, or zero at half the stature; a few have it anywhere.
     let half = q[0] * f64::from(wearer.stature) / 2.0;

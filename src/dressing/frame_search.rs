@@ -1,6 +1,6 @@
 //! Unit, axes and place of a garment's file, from how its cloth lies over a body.
 
-use super::body_guess::{GarmentSamples, Guess, Wearer, prior};
+use super::body_guess::{GarmentSamples, Guess, TriedBody, prior};
 use super::error::MeshGarmentError;
 use super::file_frame::{FileAxes, FileFrame, bounds};
 use super::settings::GuessSettings;
@@ -39,7 +39,7 @@ pub(super) fn guess(
     stated: &MeshFrame,
     settings: &GuessSettings,
 ) -> Result<GuessedBody, MeshGarmentError> {
-    let wearer = Wearer::new(template, true, settings);
+    let wearer = TriedBody::new(template, true, settings);
     let found = search(&wearer, garment, stated)?;
     let (vertices, bones) = wearer.stand(&found.guess);
     let made = template.at_rest("guessed", vertices, &bones.joints)?;
@@ -60,7 +60,7 @@ pub(super) fn locate(
     stated: &MeshFrame,
     settings: &GuessSettings,
 ) -> Result<(FileFrame, String), MeshGarmentError> {
-    let found = search(&Wearer::new(template, false, settings), garment, stated)?;
+    let found = search(&TriedBody::new(template, false, settings), garment, stated)?;
     let frame = found.samples.frame(&found.guess);
     Ok((frame, found.axes.to_string()))
 }
@@ -73,7 +73,7 @@ pub(super) fn fits(
     frame: FileFrame,
     settings: &GuessSettings,
 ) -> bool {
-    let wearer = Wearer::new(template, false, settings);
+    let wearer = TriedBody::new(template, false, settings);
     let q = wearer.start(0.0);
     let cost = |frame| {
         let samples = GarmentSamples::new(garment, frame, settings.samples, settings);
@@ -90,18 +90,18 @@ pub(super) fn fits(
 
 /// The least dear frame.
 fn search(
-    wearer: &Wearer<'_>,
+    wearer: &TriedBody<'_>,
     garment: &[P3],
     stated: &MeshFrame,
 ) -> Result<Placed, MeshGarmentError> {
-    let starts = starts(wearer, garment, stated).into_iter();
+    let starts = rough_places(wearer, garment, stated).into_iter();
     let mut placed: Vec<Placed> = starts.map(|s| s.refined(wearer, garment)).collect();
     placed.sort_by(|a, b| a.cost.total_cmp(&b.cost));
     decide(wearer, garment, placed)
 }
 
 /// Axes and place at which a refinement begins.
-struct Start {
+struct RoughPlace {
     axes: FileAxes,
     guess: Guess,
     /// Of a rough body, metres.
@@ -109,7 +109,7 @@ struct Start {
 }
 
 /// The least dear starts, and those of usual frames: the rough body may be too large for the garment to lie over.
-fn starts(wearer: &Wearer<'_>, garment: &[P3], stated: &MeshFrame) -> Vec<Start> {
+fn rough_places(wearer: &TriedBody<'_>, garment: &[P3], stated: &MeshFrame) -> Vec<RoughPlace> {
     let settings = wearer.settings;
     let extent = extent(garment);
     let (vertices, _) = wearer.stand(&wearer.start(0.0));
@@ -123,20 +123,20 @@ fn starts(wearer: &Wearer<'_>, garment: &[P3], stated: &MeshFrame) -> Vec<Start>
                 let guess = wearer.start(up);
                 let unusual = prior(wearer, &guess).min(settings.most_prior);
                 let cost = samples.distance(wearer, &skin, &guess) + unusual + small;
-                Start { axes, guess, cost }
+                RoughPlace { axes, guess, cost }
             });
             out.extend(starts.min_by(|a, b| a.cost.total_cmp(&b.cost)));
         }
     }
     out.sort_by(|a, b| a.cost.total_cmp(&b.cost));
-    let is_usual = |s: &Start| s.axes.is_conventional() || s.axes.turned().is_conventional();
+    let is_usual = |s: &RoughPlace| s.axes.is_conventional() || s.axes.turned().is_conventional();
     let rest = out.split_off(settings.refined.min(out.len()));
     out.extend(rest.into_iter().filter(is_usual));
     out
 }
 
-impl Start {
-    fn refined(self, wearer: &Wearer<'_>, garment: &[P3]) -> Placed {
+impl RoughPlace {
+    fn refined(self, wearer: &TriedBody<'_>, garment: &[P3]) -> Placed {
         let (axes, settings) = (self.axes, wearer.settings);
         let samples = GarmentSamples::new(garment, axes.frame(), settings.samples, settings);
         let (cost, guess) = samples.minimise(wearer, self.guess);
@@ -158,7 +158,7 @@ impl Start {
 }
 
 /// Heights of the file's zero over the floor at which most files have it, metres.
-fn usual_heights(wearer: &Wearer<'_>, samples: &GarmentSamples) -> Vec<f64> {
+fn usual_heights(wearer: &TriedBody<'_>, samples: &GarmentSamples) -> Vec<f64> {
     let [lo, _] = samples.heights().map(f64::from);
     let is_above_ground = |up: &f64| lo + up > wearer.settings.underground;
     let usual = [0.0, f64::from(wearer.stature) / 2.0].into_iter();
@@ -166,7 +166,7 @@ fn usual_heights(wearer: &Wearer<'_>, samples: &GarmentSamples) -> Vec<f64> {
 }
 
 /// Heights of the file's zero over the floor at which the garment touches the body, metres.
-fn heights(wearer: &Wearer<'_>, samples: &GarmentSamples) -> Vec<f64> {
+fn heights(wearer: &TriedBody<'_>, samples: &GarmentSamples) -> Vec<f64> {
     let step = wearer.settings.height_step;
     let [lo, hi] = samples.heights().map(f64::from);
     let (first, last) = (-lo, f64::from(wearer.stature) - hi);
@@ -188,7 +188,7 @@ fn small(extent: f32, settings: &GuessSettings) -> f32 {
 
 /// The first of the frames, if it is worn in it and no other one fits as well.
 fn decide(
-    wearer: &Wearer<'_>,
+    wearer: &TriedBody<'_>,
     garment: &[P3],
     placed: Vec<Placed>,
 ) -> Result<Placed, MeshGarmentError> {

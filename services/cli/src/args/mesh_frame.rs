@@ -19,7 +19,7 @@ pub(crate) struct MeshFrameArgs {
 }
 
 impl MeshFrameArgs {
-    /// What is stated.
+    /// The options as one value.
     pub(crate) fn stated(&self) -> MeshFrame {
         MeshFrame {
             metres_per_unit: self.unit,
