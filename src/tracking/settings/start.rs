@@ -53,9 +53,6 @@ settings! {
         pub sure: f32 = 0.95,
         /// Confidence below which the facing may be anything. Larger searches more often.
         pub doubtful: f32 = 0.6,
-        /// Height of the seen part of a subject below which the facing may be anything, metres: a counter that hides the legs
-        /// leaves 0.9, and the forest takes such a front for a back.
-        pub whole: f64 = 1.1,
         /// Confidence of a proposed hand or foot that can contradict a pose.
         pub heavy: f32 = 0.35,
         /// Distance beyond which it does, metres: a third of the proposed hands are wrong, and right ones lie within 10 cm.

@@ -19,8 +19,6 @@ pub(crate) struct BodyProposals {
     joints: JointProposals,
     flipped: JointProposals,
     facing: Option<Facing>,
-    /// Height of the seen part of the subject, metres.
-    seen: f64,
     /// Unit direction against gravity, camera frame.
     up: Vector3<f64>,
     settings: ProposalSettings,
@@ -36,15 +34,6 @@ pub(crate) fn person_cells<'a>(
         cells: observation.cells,
         up: up.cast(),
     }
-}
-
-/// Height of the cells along `up`, metres.
-fn height(person: &PersonCells<'_>) -> f64 {
-    let up = |c: &u32| f64::from(person.cloud.centre(*c as usize).coords.dot(&person.up));
-    let ends = (f64::INFINITY, f64::NEG_INFINITY);
-    let heights = person.cells.iter().map(up);
-    let (low, high) = heights.fold(ends, |(low, high), h| (low.min(h), high.max(h)));
-    (high - low).max(0.0)
 }
 
 impl BodyProposals {
@@ -63,7 +52,6 @@ impl BodyProposals {
             flipped: joints.flipped(&model.part_classes),
             joints,
             facing: facing(&person, &scratch.yaw),
-            seen: height(&person),
             up: *up,
             settings: model.config.start.proposals,
         }
@@ -123,15 +111,16 @@ impl BodyProposals {
 
     /// True where the facing may be anything: half a body, a profile.
     pub(crate) fn is_doubtful(&self) -> bool {
-        let is_doubtful = |f: Facing| f.confidence < self.settings.doubtful;
-        self.seen < self.settings.whole || self.facing.is_none_or(is_doubtful)
+        self.facing
+            .is_none_or(|f| f.confidence < self.settings.doubtful)
     }
 
     /// Joints as seen, and exchanged where the facing isn't sure, each with the turn of an upright trunk from the facing,
     /// radians.
     fn hypotheses(&self) -> impl Iterator<Item = (&JointProposals, f64)> {
-        let is_sure = |f: Facing| f.confidence > self.settings.sure;
-        let is_sure = self.facing.is_some_and(is_sure) && !self.is_doubtful();
+        let is_sure = self
+            .facing
+            .is_some_and(|f| f.confidence > self.settings.sure);
         let flipped = (!is_sure).then_some((&self.flipped, PI));
         std::iter::once((&self.joints, 0.0)).chain(flipped)
     }
