@@ -167,6 +167,8 @@ pub(crate) struct TrackArgs {
     /// Body template in SMPL layout; the embedded body without it.
     #[arg(long, value_name = "NPZ")]
     pub(crate) body: Option<PathBuf>,
+    #[command(flatten)]
+    pub(crate) frame: MeshFrameArgs,
     /// Rough start: {"root_position": [x, y, z], "facing_yaw_deg": d} in the camera frame.
     #[arg(long, value_name = "JSON")]
     pub(crate) init: Option<PathBuf>,

@@ -23,17 +23,17 @@ use tryon::mirror::{CapturedWardrobe, Choice};
 /// # Errors
 /// Names the array, joint or vertex of the file that is at fault.
 pub(crate) fn template(path: Option<&Path>) -> Result<Arc<Template>> {
-    match path {
-        Some(path) => template_in(path, &MeshFrame::default()),
-        None => Ok(embedded::template()),
-    }
+    template_in(path, &MeshFrame::default())
 }
 
 /// Body of a file whose unit and axes are as stated; what was found goes to stderr.
 ///
 /// # Errors
 /// As [`template`], and statements that the body contradicts.
-pub(crate) fn template_in(path: &Path, frame: &MeshFrame) -> Result<Arc<Template>> {
+pub(crate) fn template_in(path: Option<&Path>, frame: &MeshFrame) -> Result<Arc<Template>> {
+    let Some(path) = path else {
+        return Ok(embedded::template());
+    };
     let body = read_body(path, frame)?;
     for note in &body.notes {
         eprintln!("{}: {note}", path.display());
