@@ -65,6 +65,7 @@ impl<'a> TriedBody<'a> {
 }
 
 /// Samples of a garment around a wearer.
+#[derive(Clone)]
 pub(super) struct GarmentSamples {
     /// First frame of the garment, and samples of it there.
     pub(super) start: FileFrame,

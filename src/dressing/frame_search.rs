@@ -8,9 +8,11 @@ use std::sync::Arc;
 use tryon_body::Template;
 use tryon_formats::mesh_frame::MeshFrame;
 use tryon_geometry::math::{P3, V3};
+use tryon_geometry::par::{Par, map_into};
 use tryon_geometry::spatial::PointTree;
 
 /// A garment in one of the frames that its file may have.
+#[derive(Clone)]
 struct Placed {
     axes: FileAxes,
     samples: GarmentSamples,
@@ -94,8 +96,11 @@ fn search(
     garment: &[P3],
     stated: &MeshFrame,
 ) -> Result<Placed, MeshGarmentError> {
-    let starts = rough_places(wearer, garment, stated).into_iter();
-    let mut placed: Vec<Placed> = starts.map(|s| s.refined(wearer, garment)).collect();
+    let rough = rough_places(wearer, garment, stated);
+    let refined = |k: usize| Some(rough[k].refined(wearer, garment));
+    let mut placed = Vec::new();
+    map_into(Par::Rayon, rough.len(), 1, &mut placed, refined);
+    let mut placed: Vec<Placed> = placed.into_iter().flatten().collect();
     placed.sort_by(|a, b| a.cost.total_cmp(&b.cost));
     decide(wearer, garment, placed)
 }
@@ -136,7 +141,7 @@ fn rough_places(wearer: &TriedBody<'_>, garment: &[P3], stated: &MeshFrame) -> V
 }
 
 impl RoughPlace {
-    fn refined(self, wearer: &TriedBody<'_>, garment: &[P3]) -> Placed {
+    fn refined(&self, wearer: &TriedBody<'_>, garment: &[P3]) -> Placed {
         let (axes, settings) = (self.axes, wearer.settings);
         let samples = GarmentSamples::new(garment, axes.frame(), settings.samples, settings);
         let (cost, guess) = samples.minimise(wearer, self.guess);
