@@ -29,6 +29,7 @@ mod bag_file;
 mod bvh;
 mod camera_json;
 mod chunk_records;
+mod converted;
 mod depth_metres;
 mod error;
 pub mod fabric_json;

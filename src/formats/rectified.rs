@@ -1,16 +1,12 @@
 //! Recording whose frames are rectified as they are read.
 
+use super::converted::{Converted, FrameConverter};
 use super::rgbd_source::RgbdSource;
-use super::{CameraFile, FormatError};
-use std::path::{Path, PathBuf};
-use tryon_geometry::camera::{Calibration, Rectifier, RgbdFrame};
+use std::path::Path;
+use tryon_geometry::camera::{Calibration, FrameSizeError, Rectifier, RgbdFrame};
 
 /// Source of rectified frames from one whose frames have lens distortion.
-pub struct Rectified {
-    path: PathBuf,
-    source: Box<dyn RgbdSource>,
-    rectifier: Rectifier,
-}
+pub type Rectified = Converted<Rectifier>;
 
 impl Rectified {
     /// Wraps `source` if its lenses distort; `path` is named in errors.
@@ -19,49 +15,23 @@ impl Rectified {
         if rectifier.is_identity() {
             return source;
         }
-        Box::new(Self {
-            path: path.to_owned(),
-            source,
-            rectifier,
-        })
+        Box::new(Self::new(path, source, rectifier))
     }
 }
 
-impl RgbdSource for Rectified {
+impl FrameConverter for Rectifier {
     fn calibration(&self) -> &Calibration {
-        self.rectifier.calibration()
+        self.calibration()
     }
-    fn untaken(&self) -> &[String] {
-        self.source.untaken()
-    }
-    fn camera_file(&self) -> CameraFile {
-        self.source.camera_file()
-    }
-    fn color_time_ns(&self) -> Option<u64> {
-        self.source.color_time_ns()
-    }
-    fn len(&self) -> Option<usize> {
-        self.source.len()
-    }
-    fn next_frame(&mut self) -> Result<Option<RgbdFrame>, FormatError> {
-        let Some(mut frame) = self.source.next_frame()? else {
-            return Ok(None);
-        };
-        let converted = self.rectifier.rectify(&mut frame);
-        converted.map_err(|e| FormatError::frame(&self.path, frame.sequence, e))?;
-        Ok(Some(frame))
-    }
-    fn skip_frame(&mut self) -> Result<bool, FormatError> {
-        self.source.skip_frame()
-    }
-    fn rewind(&mut self) -> Result<(), FormatError> {
-        self.source.rewind()
+    fn convert(&mut self, frame: &mut RgbdFrame) -> Result<(), FrameSizeError> {
+        self.rectify(frame)
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::FormatError;
     use tryon_geometry::camera::{DepthImage, Distortion, Intrinsics, Lens, LensCalibration};
 
     /// Two frames of a lens; the second one has another size.

@@ -1,16 +1,15 @@
 //! Source whose frames are set upright as they are read: of a camera that hangs turned, or delivers mirrored pictures.
 
+use super::CameraFile;
+use super::converted::{Converted, FrameConverter};
 use super::rgbd_source::RgbdSource;
-use super::{CameraFile, FormatError};
-use std::path::{Path, PathBuf};
-use tryon_geometry::camera::{Calibration, LensCalibration, Mounting, Reorienter, RgbdFrame};
+use std::path::Path;
+use tryon_geometry::camera::{
+    Calibration, FrameSizeError, LensCalibration, Mounting, Reorienter, RgbdFrame,
+};
 
 /// Source of upright frames from one that is mounted otherwise.
-pub struct Reoriented {
-    path: PathBuf,
-    source: Box<dyn RgbdSource>,
-    reorienter: Reorienter,
-}
+pub type Reoriented = Converted<Reorienter>;
 
 impl Reoriented {
     /// Wraps `source` unless it is upright; `path` is named in errors.
@@ -22,48 +21,25 @@ impl Reoriented {
         if mounting.is_upright() {
             return source;
         }
-        Box::new(Self {
-            path: path.to_owned(),
-            reorienter: Reorienter::new(mounting, &source.lenses()),
-            source,
-        })
+        let reorienter = Reorienter::new(mounting, &source.lenses());
+        Box::new(Self::new(path, source, reorienter))
     }
 }
 
-impl RgbdSource for Reoriented {
+impl FrameConverter for Reorienter {
     fn calibration(&self) -> &Calibration {
-        self.reorienter.calibration()
+        self.calibration()
     }
     fn lenses(&self) -> LensCalibration {
-        self.reorienter.lenses().clone()
+        self.lenses().clone()
     }
-    fn camera_file(&self) -> CameraFile {
+    fn camera_file(&self, recorded: CameraFile) -> CameraFile {
         CameraFile {
-            lenses: self.lenses(),
-            ..self.source.camera_file()
+            lenses: self.lenses().clone(),
+            ..recorded
         }
     }
-    fn color_time_ns(&self) -> Option<u64> {
-        self.source.color_time_ns()
-    }
-    fn untaken(&self) -> &[String] {
-        self.source.untaken()
-    }
-    fn len(&self) -> Option<usize> {
-        self.source.len()
-    }
-    fn next_frame(&mut self) -> Result<Option<RgbdFrame>, FormatError> {
-        let Some(mut frame) = self.source.next_frame()? else {
-            return Ok(None);
-        };
-        let converted = self.reorienter.reorient(&mut frame);
-        converted.map_err(|e| FormatError::frame(&self.path, frame.sequence, e))?;
-        Ok(Some(frame))
-    }
-    fn skip_frame(&mut self) -> Result<bool, FormatError> {
-        self.source.skip_frame()
-    }
-    fn rewind(&mut self) -> Result<(), FormatError> {
-        self.source.rewind()
+    fn convert(&mut self, frame: &mut RgbdFrame) -> Result<(), FrameSizeError> {
+        self.reorient(frame)
     }
 }
