@@ -96,6 +96,9 @@ fn search(
     garment: &[P3],
     stated: &MeshFrame,
 ) -> Result<Placed, MeshGarmentError> {
+    if garment.is_empty() {
+        return Err(MeshGarmentError::Nothing("it has no vertices".into()));
+    }
     let rough = rough_places(wearer, garment, stated);
     let refined = |k: usize| Some(rough[k].refined(wearer, garment));
     let mut placed = Vec::new();
@@ -294,6 +297,13 @@ mod tests {
         };
         let (_, words) = locate(&t, &vest(&settings), &stated, &settings).expect("worn");
         assert_eq!(words, "in m, y up, facing -z");
+    }
+
+    #[test]
+    fn no_vertices_are_no_garment() {
+        let (t, settings) = (embedded::template(), GuessSettings::default());
+        let found = locate(&t, &[], &MeshFrame::default(), &settings);
+        assert!(matches!(found, Err(MeshGarmentError::Nothing(_))));
     }
 
     #[test]
