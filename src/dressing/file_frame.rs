@@ -1,11 +1,10 @@
 //! Unit and frame of a mesh file.
 
 use nalgebra::Matrix3;
-use tryon_formats::mesh_frame::{MeshAxis, MeshFrame, unit_name, upright_rotation};
+use tryon_formats::mesh_frame::{
+    IMPERIAL_UNITS, METRIC_UNITS, MeshAxis, MeshFrame, unit_name, upright_rotation,
+};
 use tryon_geometry::math::{P3, V3};
-
-/// Metres in the units that exporters write.
-const UNITS: [f64; 6] = [1.0, 0.1, 0.01, 0.001, 0.0254, 0.3048];
 
 /// Map from a file's own unit and frame to metres, y up, facing +z.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -51,7 +50,11 @@ impl FileAxes {
         };
         let mut units: Vec<f64> = match stated.metres_per_unit {
             Some(unit) => vec![unit],
-            None => UNITS.into_iter().filter(is_plausible).collect(),
+            None => METRIC_UNITS
+                .into_iter()
+                .chain(IMPERIAL_UNITS)
+                .filter(is_plausible)
+                .collect(),
         };
         if units.is_empty() {
             units.push(1.0);

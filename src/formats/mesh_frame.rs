@@ -4,6 +4,11 @@ use nalgebra::Matrix3;
 use std::fmt;
 use std::str::FromStr;
 
+/// Metric units that exporters write, metres.
+pub const METRIC_UNITS: [f64; 4] = [1.0, 0.1, 0.01, 0.001];
+/// Inch and foot, metres.
+pub const IMPERIAL_UNITS: [f64; 2] = [0.0254, 0.3048];
+
 /// Names of units in options, with their length in metres. The first name of a length is the one shown.
 const UNITS: [(&str, f64); 11] = [
     ("m", 1.0),

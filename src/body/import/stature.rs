@@ -1,6 +1,6 @@
 //! Unit of a body from its stature, and the limits of a person's stature and volume.
 
-use tryon_formats::mesh_frame::unit_name;
+use tryon_formats::mesh_frame::{IMPERIAL_UNITS, METRIC_UNITS, unit_name};
 
 /// Statures of people, metres: from the newborn to the tallest.
 pub(super) const STATURE: [f64; 2] = [0.4, 2.6];
@@ -8,9 +8,6 @@ pub(super) const STATURE: [f64; 2] = [0.4, 2.6];
 const BULK: [f64; 2] = [0.005, 0.06];
 /// Statures of grown people, metres.
 const GROWN: [f64; 2] = [1.1, 2.6];
-/// Units that exporters write, metres.
-const METRIC: [f64; 4] = [1.0, 0.1, 0.01, 0.001];
-const IMPERIAL: [f64; 2] = [0.0254, 0.3048];
 
 /// Metres in a unit of the file, from its stature in that unit: the metric unit that makes it a person's, or else inches or
 /// feet. A child in the one that is grown in the other is ambiguous.
@@ -33,8 +30,8 @@ pub fn unit_of_stature(stature: f64, stated: Option<f64>) -> Result<f64, String>
         };
     }
     let is_grown = |unit: f64| (GROWN[0]..=GROWN[1]).contains(&(stature * unit));
-    let metric = METRIC.into_iter().find(|u| is_person(*u));
-    let imperial = IMPERIAL.into_iter().find(|u| is_person(*u));
+    let metric = METRIC_UNITS.into_iter().find(|u| is_person(*u));
+    let imperial = IMPERIAL_UNITS.into_iter().find(|u| is_person(*u));
     match (metric, imperial) {
         (Some(unit), None) | (None, Some(unit)) => Ok(unit),
         (Some(unit), Some(other)) if is_grown(unit) || !is_grown(other) => Ok(unit),
@@ -47,9 +44,9 @@ pub fn unit_of_stature(stature: f64, stated: Option<f64>) -> Result<f64, String>
 
 /// The options that would make a stature a person's.
 fn proposal(stature: f64) -> String {
-    let fitting = METRIC
+    let fitting = METRIC_UNITS
         .iter()
-        .chain(&IMPERIAL)
+        .chain(&IMPERIAL_UNITS)
         .filter(|u| (STATURE[0]..=STATURE[1]).contains(&(stature * **u)));
     let options: Vec<String> = fitting
         .map(|u| format!("`--unit {}` ({:.2} m)", unit_name(*u), stature * u))
