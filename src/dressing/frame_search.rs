@@ -105,7 +105,7 @@ fn search(
     map_into(Par::Rayon, rough.len(), 1, &mut placed, refined);
     let mut placed: Vec<Placed> = placed.into_iter().flatten().collect();
     placed.sort_by(|a, b| a.cost.total_cmp(&b.cost));
-    decide(wearer, garment, placed)
+    decide(wearer, garment, placed, stated)
 }
 
 /// Axes and place at which a refinement begins.
@@ -199,6 +199,7 @@ fn decide(
     wearer: &TriedBody<'_>,
     garment: &[P3],
     placed: Vec<Placed>,
+    stated: &MeshFrame,
 ) -> Result<Placed, MeshGarmentError> {
     let settings = wearer.settings;
     let mut placed = placed.into_iter();
@@ -217,9 +218,9 @@ fn decide(
         return Ok(best);
     }
     let option = match () {
-        () if rival.axes.unit != best.axes.unit => "--unit",
-        () if rival.axes.up != best.axes.up => "--up",
-        () => "--facing",
+        () if rival.axes.unit != best.axes.unit => stated.options.unit,
+        () if rival.axes.up != best.axes.up => stated.options.up,
+        () => stated.options.facing,
     };
     Err(MeshGarmentError::Ambiguous {
         first: best.axes.to_string(),

@@ -82,7 +82,8 @@ impl SourceBody {
         let skin = framed(&skin, frame, standing.is_inside_out).map_err(BodyError::Mesh)?;
         let (template, fit) = rig_standing(skin).map_err(|why| {
             unknown(format!(
-                "{why}; it was taken as {axes}: say `--up` and `--facing` if it is another way"
+                "{why}; it was taken as {axes}: say `{}` and `{}` if it is another way",
+                stated.options.up, stated.options.facing
             ))
         })?;
         Ok(Self {

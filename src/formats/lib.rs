@@ -81,7 +81,7 @@ pub use error::FormatError;
 pub use face_origins::{FaceOrigin, FaceOrigins, PartName};
 pub use k4a_file::K4aReader;
 pub use mcap_file::McapWriter;
-pub use mesh_frame::{MeshAxis, MeshFrame};
+pub use mesh_frame::{FrameOptions, MeshAxis, MeshFrame};
 pub use messages::live;
 pub use motion::read_motion;
 pub use motion_clip::MotionClip;

@@ -121,15 +121,43 @@ pub fn unit_name(metres: f64) -> String {
     named.map_or_else(|| format!("{metres} m"), |u| u.0.to_owned())
 }
 
+/// Names of the options by which a file's frame is stated, for messages.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct FrameOptions {
+    /// Of [`MeshFrame::metres_per_unit`].
+    pub unit: &'static str,
+    /// Of [`MeshFrame::up`].
+    pub up: &'static str,
+    /// Of [`MeshFrame::facing`].
+    pub facing: &'static str,
+}
+
+impl FrameOptions {
+    /// Options of the only file with a frame.
+    pub const PLAIN: Self = Self {
+        unit: "--unit",
+        up: "--up",
+        facing: "--facing",
+    };
+}
+
+impl Default for FrameOptions {
+    fn default() -> Self {
+        Self::PLAIN
+    }
+}
+
 /// Unit and axes of a mesh file as far as its user states them; the rest is recognised from the mesh.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct MeshFrame {
-    /// Metres in one unit of the file (`--unit`).
+    /// Metres in one unit of the file.
     pub metres_per_unit: Option<f64>,
-    /// Axis of the file that points from the feet to the head (`--up`).
+    /// Axis of the file that points from the feet to the head.
     pub up: Option<MeshAxis>,
-    /// Axis of the file that points ahead of the wearer (`--facing`).
+    /// Axis of the file that points ahead of the wearer.
     pub facing: Option<MeshAxis>,
+    /// Options that state these.
+    pub options: FrameOptions,
 }
 
 impl MeshFrame {
@@ -138,6 +166,7 @@ impl MeshFrame {
         metres_per_unit: Some(1.0),
         up: Some(MeshAxis::Y),
         facing: Some(MeshAxis::Z),
+        options: FrameOptions::PLAIN,
     };
 }
 

@@ -19,7 +19,7 @@ pub(crate) use clothcap::{
 };
 pub(crate) use fine::FineSessionArgs;
 pub(crate) use identity::{IdentityArgs, IdentityIssueArgs, IdentityMakeArgs, IdentityWhat};
-pub(crate) use mesh_frame::MeshFrameArgs;
+pub(crate) use mesh_frame::{BodyArgs, GarmentBodyArgs, MeshFrameArgs};
 pub(crate) use offline::{FineArgs, SolverArgs};
 pub(crate) use serve::{DemoArgs, UpArgs};
 pub(crate) use token::{
@@ -104,10 +104,8 @@ pub(crate) struct RunArgs {
     /// clothcap capture` wrote for all its garments, FOLDER/top, FOLDER/under, FOLDER/bottom … for one).
     #[arg(long = "garment", value_name = "NAME|FILE|CAPTURE", required = true)]
     pub(crate) garments: Vec<String>,
-    /// The body that mesh garments were made on (.npz in SMPL layout, or an .obj that stands upright; MakeHuman clothes:
-    /// its base mesh with the helpers). Without it the garment's own place and size are guessed from.
-    #[arg(long, value_name = "NPZ|OBJ")]
-    pub(crate) garment_body: Option<PathBuf>,
+    #[command(flatten)]
+    pub(crate) garment_body: GarmentBodyArgs,
     #[command(flatten)]
     pub(crate) frame: MeshFrameArgs,
     /// Fabric of all garments instead of their own: a preset's name, a file measured as by Wang et al. 2011, or a material.
@@ -121,9 +119,8 @@ pub(crate) struct RunArgs {
     /// vertices × 3, f32) and outfit.glb of both.
     #[arg(long, value_name = "DIR")]
     pub(crate) out: PathBuf,
-    /// Body template in SMPL layout; the embedded body without it.
-    #[arg(long, value_name = "NPZ")]
-    pub(crate) body: Option<PathBuf>,
+    #[command(flatten)]
+    pub(crate) body: BodyArgs,
     /// Stop after so many frames.
     #[arg(long, value_name = "N")]
     pub(crate) frames: Option<usize>,
@@ -149,7 +146,7 @@ impl RunArgs {
     pub(crate) fn given(&self) -> GivenChoice<'_> {
         GivenChoice {
             size: self.size.as_deref(),
-            body: self.garment_body.as_deref(),
+            body: self.garment_body.given(),
             frame: self.frame.stated(),
             fabric: self.fabric.as_deref(),
         }
@@ -164,11 +161,8 @@ pub(crate) struct TrackArgs {
     pub(crate) input: PathBuf,
     #[command(flatten)]
     pub(crate) recording: RecordingArgs,
-    /// Body template in SMPL layout; the embedded body without it.
-    #[arg(long, value_name = "NPZ")]
-    pub(crate) body: Option<PathBuf>,
     #[command(flatten)]
-    pub(crate) frame: MeshFrameArgs,
+    pub(crate) body: BodyArgs,
     /// Rough start: {"root_position": [x, y, z], "facing_yaw_deg": d} in the camera frame.
     #[arg(long, value_name = "JSON")]
     pub(crate) init: Option<PathBuf>,

@@ -1,5 +1,6 @@
 //! Inputs that several commands share: bodies, garments, rough starts, and the progress bar over frames.
 
+use crate::args::BodyArgs;
 use anyhow::{Context, Result, ensure};
 use indicatif::{ProgressBar, ProgressStyle};
 use serde::Deserialize;
@@ -18,22 +19,22 @@ use tryon::garment::import::from_garmentcode;
 use tryon::garment::{FabricSample, Material, Pattern, Size, Triangulation};
 use tryon::mirror::{CapturedWardrobe, Choice};
 
-/// Body to track: an SMPL-layout npz, or the embedded one.
+/// Body to track: that of `--body`, or the embedded one.
 ///
 /// # Errors
-/// Names the array, joint or vertex of the file that is at fault.
-pub(crate) fn template(path: Option<&Path>) -> Result<Arc<Template>> {
-    template_in(path, &MeshFrame::default())
+/// As [`body_in`].
+pub(crate) fn template(body: &BodyArgs) -> Result<Arc<Template>> {
+    match body.file() {
+        Some(path) => body_in(path, &body.stated()),
+        None => Ok(embedded::template()),
+    }
 }
 
-/// Body of a file whose unit and axes are as stated; what was found goes to stderr.
+/// Body of an SMPL-layout npz whose unit and axes are as stated; what was found goes to stderr.
 ///
 /// # Errors
-/// As [`template`], and statements that the body contradicts.
-pub(crate) fn template_in(path: Option<&Path>, frame: &MeshFrame) -> Result<Arc<Template>> {
-    let Some(path) = path else {
-        return Ok(embedded::template());
-    };
+/// Names the array, joint or vertex of the file that is at fault, and statements that the body contradicts.
+pub(crate) fn body_in(path: &Path, frame: &MeshFrame) -> Result<Arc<Template>> {
     let body = read_body(path, frame)?;
     for note in &body.notes {
         eprintln!("{}: {note}", path.display());
@@ -85,7 +86,7 @@ pub(crate) fn choices(names: &[String], given: &GivenChoice<'_>) -> Result<Vec<C
         );
     }
     let body = (given.body)
-        .map(SourceBody::read)
+        .map(|(file, frame)| SourceBody::read_in(file, &frame))
         .transpose()
         .context("--garment-body")?;
     let mut chosen = Vec::new();
@@ -116,8 +117,8 @@ pub(crate) fn choices(names: &[String], given: &GivenChoice<'_>) -> Result<Vec<C
 pub(crate) struct GivenChoice<'a> {
     /// Size, but of pattern files.
     pub(crate) size: Option<&'a str>,
-    /// Body under the mesh files.
-    pub(crate) body: Option<&'a Path>,
+    /// Body under the mesh files: its file, with unit and axes.
+    pub(crate) body: Option<(&'a Path, MeshFrame)>,
     /// Unit and axes of the mesh files.
     pub(crate) frame: MeshFrame,
     /// Fabric: a preset's name or a file.

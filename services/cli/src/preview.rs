@@ -41,7 +41,7 @@ impl Preview {
     pub(crate) fn open(args: &RunArgs) -> Result<Self> {
         let choices = input::choices(&args.garments, &args.given())?;
         let mut source = args.recording.open(&args.input)?;
-        let template = input::template(args.body.as_deref())?;
+        let template = input::template(&args.body)?;
         let mirror = Mirror::new(template, source.calibration(), choices);
         let most = args.frames.unwrap_or(usize::MAX);
         let is_still = source.len().map(|n| n.min(most)) == Some(1);

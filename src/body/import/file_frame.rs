@@ -38,18 +38,12 @@ impl BodyFrame {
     ) -> Result<Self, String> {
         let mut notes = Vec::new();
         let (up, lateral) = directions(arrays, named);
-        let up = axis("up", up, stated.up)?;
-        let facing = facing(
-            arrays,
-            named,
-            Vector3::from(up.vector()),
-            lateral,
-            stated.facing,
-        )?;
+        let up = axis(stated.options.up, up, stated.up)?;
+        let facing = facing(arrays, named, Vector3::from(up.vector()), lateral, stated)?;
         let rotation = upright_rotation(up, facing)
-            .ok_or_else(|| format!("`--up {up}` and `--facing {facing}` lie along one axis"))?;
+            .ok_or_else(|| format!("its {up} up and {facing} ahead lie along one axis"))?;
         let stature = extent(arrays, Vector3::from(up.vector()));
-        let unit = unit_of_stature(stature, stated.metres_per_unit)?;
+        let unit = unit_of_stature(stature, stated)?;
         if (unit - 1.0).abs() > 1e-9 {
             notes.push(format!(
                 "in {}: stature {stature:.1} is {:.2} m",
@@ -168,7 +162,7 @@ fn axis(
     let (found, cosine) = MeshAxis::nearest(direction.into()).ok_or("its head lies at its feet")?;
     if cosine < ALONG {
         return Err(format!(
-            "its {option} direction ({:.2}, {:.2}, {:.2}) is {:.0}° from the nearest axis, {found}; turn the body upright",
+            "its direction for `{option}` ({:.2}, {:.2}, {:.2}) is {:.0}° from the nearest axis, {found}; turn the body upright",
             direction.x,
             direction.y,
             direction.z,
@@ -177,7 +171,7 @@ fn axis(
     }
     match stated {
         Some(said) if said != found => Err(format!(
-            "`--{option} {said}`, but the body's joints lie with {found} {option}: say `--{option} {found}`, or nothing"
+            "`{option} {said}`, but the body's joints show {found}: say `{option} {found}`, or nothing"
         )),
         _ => Ok(found),
     }
@@ -189,12 +183,13 @@ fn facing(
     named: &NamedJoints,
     up: Vector3<f64>,
     lateral: Vector3<f64>,
-    stated: Option<MeshAxis>,
+    stated: &MeshFrame,
 ) -> Result<MeshAxis, String> {
+    let option = stated.options.facing;
     let found = axis(
-        "facing",
+        option,
         lateral.cross(&up),
-        stated.filter(|_| named.basis != SideBasis::Names),
+        stated.facing.filter(|_| named.basis != SideBasis::Names),
     )?;
     if named.basis != SideBasis::Names {
         return Ok(found);
@@ -211,14 +206,14 @@ fn facing(
         Some((skin - places[leg.end()]).dot(&Vector3::from(found.vector())))
     });
     let toes = feet.sum::<f64>() / 2.0 / extent(arrays, up).max(f64::MIN_POSITIVE);
-    match stated {
+    match stated.facing {
         None if toes < TOES => Err(format!(
-            "faces {found} by the names of its joints, but its feet do not show it ({:.1} % of the stature ahead of the ankles, expected {:.1} %); say `--facing {found}` if it does",
+            "faces {found} by the names of its joints, but its feet do not show it ({:.1} % of the stature ahead of the ankles, expected {:.1} %); say `{option} {found}` if it does",
             100.0 * toes,
             100.0 * TOES
         )),
         Some(said) if said != found => Err(format!(
-            "`--facing {said}`, but by the names of its joints it faces {found}"
+            "`{option} {said}`, but by the names of its joints it faces {found}"
         )),
         _ => Ok(found),
     }

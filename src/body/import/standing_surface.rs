@@ -74,11 +74,11 @@ impl StandingFrame {
         }
         let lateral = lateral_axis(points, stated)?;
         let [up, ahead] = upright(points, lateral, stated)?;
-        let up = head_up(points, lateral, up, stated.up)?;
-        let facing = toes_ahead(points, up, ahead, stated.facing)?;
+        let up = head_up(points, lateral, up, stated)?;
+        let facing = toes_ahead(points, up, ahead, stated)?;
         let [low, high] = range(points.iter(), up);
         let stature = f64::from(high - low);
-        let unit = unit_of_stature(stature, stated.metres_per_unit)?;
+        let unit = unit_of_stature(stature, stated)?;
         let volume = mesh.volume() * unit.powi(3);
         check_volume(volume.abs(), stature * unit)?;
         let mut notes = Vec::new();
@@ -128,8 +128,10 @@ fn lateral_axis(points: &[P3], stated: &MeshFrame) -> Result<usize, String> {
                 .map(|(d, k)| format!("{} {:.1} %", axis(*k), 100.0 * d))
                 .collect();
             Err(format!(
-                "its left and right are unlike: no axis mirrors it clearly ({} of its size apart); say `--up` and `--facing`",
-                all.join(", ")
+                "its left and right are unlike: no axis mirrors it clearly ({} of its size apart); say `{}` and `{}`",
+                all.join(", "),
+                stated.options.up,
+                stated.options.facing
             ))
         }
     }
@@ -179,9 +181,10 @@ fn upright(points: &[P3], lateral: usize, stated: &MeshFrame) -> Result<[usize; 
         Ok([b, a])
     } else {
         Err(format!(
-            "it is as deep as tall ({p:.2} along {}, {q:.2} along {}): no standing body; say `--up`",
+            "it is as deep as tall ({p:.2} along {}, {q:.2} along {}): no standing body; say `{}`",
             axis(a),
-            axis(b)
+            axis(b),
+            stated.options.up
         ))
     }
 }
@@ -191,7 +194,7 @@ fn head_up(
     points: &[P3],
     lateral: usize,
     up: usize,
-    stated: Option<MeshAxis>,
+    stated: &MeshFrame,
 ) -> Result<MeshAxis, String> {
     let [low, high] = range(points.iter(), axis(up));
     let [left, right] = range(points.iter(), axis(lateral));
@@ -222,14 +225,15 @@ fn head_up(
     } else {
         None
     };
-    match (found, stated) {
+    let option = stated.options.up;
+    match (found, stated.up) {
         (Some(found), Some(said)) if found != said => Err(format!(
-            "`--up {said}` puts its head below its feet; say `--up {found}`, or nothing"
+            "`{option} {said}` puts its head below its feet; say `{option} {found}`, or nothing"
         )),
         (_, Some(said)) => Ok(said),
         (Some(found), None) => Ok(found),
         (None, None) => Err(format!(
-            "which end of {} is its head is unclear (of the surface {:.1} % at the low and {:.1} % at the high end lie between left and right; legs leave that empty); say `--up {}` or `--up -{}`",
+            "which end of {} is its head is unclear (of the surface {:.1} % at the low and {:.1} % at the high end lie between left and right; legs leave that empty); say `{option} {}` or `{option} -{}`",
             axis(up),
             100.0 * bottom,
             100.0 * top,
@@ -244,7 +248,7 @@ fn toes_ahead(
     points: &[P3],
     up: MeshAxis,
     ahead: usize,
-    stated: Option<MeshAxis>,
+    stated: &MeshFrame,
 ) -> Result<MeshAxis, String> {
     let [low, high] = range(points.iter(), up);
     let stature = high - low;
@@ -261,14 +265,15 @@ fn toes_ahead(
         index: ahead,
         is_negative: reach < 0.0,
     });
-    match (found, stated) {
+    let option = stated.options.facing;
+    match (found, stated.facing) {
         (Some(found), Some(said)) if found != said => Err(format!(
-            "`--facing {said}`, but its feet point to {found}; say `--facing {found}`, or nothing"
+            "`{option} {said}`, but its feet point to {found}; say `{option} {found}`, or nothing"
         )),
         (_, Some(said)) => Ok(said),
         (Some(found), None) => Ok(found),
         (None, None) => Err(format!(
-            "its feet do not show the way ahead ({:.1} % of the stature, expected {:.1} %); say `--facing {}` or `--facing -{}`",
+            "its feet do not show the way ahead ({:.1} % of the stature, expected {:.1} %); say `{option} {}` or `{option} -{}`",
             100.0 * reach,
             100.0 * TOES,
             axis(ahead),

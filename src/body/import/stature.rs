@@ -1,6 +1,6 @@
 //! Unit of a body from its stature, and the limits of a person's stature and volume.
 
-use tryon_formats::mesh_frame::{IMPERIAL_UNITS, METRIC_UNITS, unit_name};
+use tryon_formats::mesh_frame::{IMPERIAL_UNITS, METRIC_UNITS, MeshFrame, unit_name};
 
 /// Statures of people, metres: from the newborn to the tallest.
 pub(super) const STATURE: [f64; 2] = [0.4, 2.6];
@@ -14,18 +14,19 @@ const GROWN: [f64; 2] = [1.1, 2.6];
 ///
 /// # Errors
 /// No unit makes it a person's, two do, or the stated one does not.
-pub fn unit_of_stature(stature: f64, stated: Option<f64>) -> Result<f64, String> {
+pub fn unit_of_stature(stature: f64, stated: &MeshFrame) -> Result<f64, String> {
     let is_person = |unit: f64| (STATURE[0]..=STATURE[1]).contains(&(stature * unit));
     let [low, high] = STATURE;
-    if let Some(unit) = stated {
+    let option = stated.options.unit;
+    if let Some(unit) = stated.metres_per_unit {
         let metres = stature * unit;
         return if is_person(unit) {
             Ok(unit)
         } else {
             Err(format!(
-                "stature {metres:.3} m by `--unit {}`, expected {low} to {high} m; {}",
+                "stature {metres:.3} m by `{option} {}`, expected {low} to {high} m; {}",
                 unit_name(unit),
-                proposal(stature)
+                proposal(stature, option)
             ))
         };
     }
@@ -37,19 +38,19 @@ pub fn unit_of_stature(stature: f64, stated: Option<f64>) -> Result<f64, String>
         (Some(unit), Some(other)) if is_grown(unit) || !is_grown(other) => Ok(unit),
         _ => Err(format!(
             "stature {stature:.3} in the file's unit, expected {low} to {high} m; {}",
-            proposal(stature)
+            proposal(stature, option)
         )),
     }
 }
 
 /// The options that would make a stature a person's.
-fn proposal(stature: f64) -> String {
+fn proposal(stature: f64, option: &str) -> String {
     let fitting = METRIC_UNITS
         .iter()
         .chain(&IMPERIAL_UNITS)
         .filter(|u| (STATURE[0]..=STATURE[1]).contains(&(stature * **u)));
     let options: Vec<String> = fitting
-        .map(|u| format!("`--unit {}` ({:.2} m)", unit_name(*u), stature * u))
+        .map(|u| format!("`{option} {}` ({:.2} m)", unit_name(*u), stature * u))
         .collect();
     match options.len() {
         0 => "no unit makes it a person's".into(),
@@ -75,36 +76,40 @@ pub(super) fn check_volume(volume: f64, stature: f64) -> Result<(), String> {
 mod tests {
     use super::*;
 
+    fn unit(stature: f64, metres_per_unit: Option<f64>) -> Result<f64, String> {
+        let stated = MeshFrame {
+            metres_per_unit,
+            ..MeshFrame::default()
+        };
+        unit_of_stature(stature, &stated)
+    }
+
     #[test]
     fn units_are_recognised_or_asked_for() {
-        for (stature, unit) in [
+        for (stature, right) in [
             (1.7, 1.0),
             (0.9, 1.0),
             (17.0, 0.1),
             (170.0, 0.01),
             (1700.0, 0.001),
         ] {
-            assert_eq!(unit_of_stature(stature, None), Ok(unit));
+            assert_eq!(unit(stature, None), Ok(right));
         }
         // A person of 66 inches or a child of 66 cm; of 5.6 feet or 56 cm.
         for (stature, names) in [(66.0, ["cm", "inch"]), (5.6, ["dm", "foot"])] {
-            let why = unit_of_stature(stature, None).expect_err("two units");
+            let why = unit(stature, None).expect_err("two units");
             assert!(
                 names.iter().all(|n| why.contains(&format!("--unit {n}"))),
                 "{why}"
             );
         }
-        assert_eq!(unit_of_stature(66.0, Some(0.0254)), Ok(0.0254));
+        assert_eq!(unit(66.0, Some(0.0254)), Ok(0.0254));
         assert!(
-            unit_of_stature(170.0, Some(1.0))
+            unit(170.0, Some(1.0))
                 .expect_err("a giant")
                 .contains("--unit cm")
         );
-        assert!(
-            unit_of_stature(0.01, None)
-                .expect_err("an ant")
-                .contains("no unit")
-        );
+        assert!(unit(0.01, None).expect_err("an ant").contains("no unit"));
     }
 
     #[test]

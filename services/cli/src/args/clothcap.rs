@@ -1,5 +1,6 @@
 //! Flags of `tryon clothcap`.
 
+use super::BodyArgs;
 use crate::recording::RecordingArgs;
 use clap::{Args, Subcommand, ValueEnum};
 use std::path::PathBuf;
@@ -37,9 +38,8 @@ pub(crate) struct ScanArgs {
 /// Body, units and axes of scans.
 #[derive(Clone, Debug, Args)]
 pub(crate) struct ScanFrameArgs {
-    /// Body template in SMPL layout; the embedded body without it.
-    #[arg(long, value_name = "NPZ")]
-    pub(crate) body: Option<PathBuf>,
+    #[command(flatten)]
+    pub(crate) body: BodyArgs,
     /// Unit of the scans: m, dm, cm, mm, inch, foot, or metres as a number. Without it unit and up axis are found.
     #[arg(long, value_parser = metres_per_unit, value_name = "UNIT")]
     pub(crate) unit: Option<f64>,
@@ -164,9 +164,8 @@ pub(crate) struct ClothcapRetargetArgs {
     /// Folder of a capture.
     #[arg(long, value_name = "DIR")]
     pub(crate) capture: PathBuf,
-    /// Body in SMPL layout.
-    #[arg(long, value_name = "NPZ")]
-    pub(crate) body: Option<PathBuf>,
+    #[command(flatten)]
+    pub(crate) body: BodyArgs,
     /// Number of bodies drawn from the shape space.
     #[arg(long, value_name = "N")]
     pub(crate) population: Option<usize>,

@@ -76,7 +76,7 @@ fn stem(path: &Path) -> &str {
 }
 
 fn body(args: &ImportArgs) -> Result<()> {
-    let t = input::template_in(Some(&args.input), &args.frame.stated())?;
+    let t = input::body_in(&args.input, &args.frame.stated())?;
     let (m, s) = (t.mesh(), t.skeleton());
     println!(
         "body: {} vertices, {} faces, {} joints, {} angles",

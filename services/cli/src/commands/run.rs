@@ -147,7 +147,7 @@ pub(crate) fn run(args: &RunArgs) -> Result<ExitCode> {
     ensure!(args.fine.still.is_none(), "--still needs --solver offline");
     let choices = input::choices(&args.garments, &args.given())?;
     let source = args.recording.open(&args.input)?;
-    let template = input::template(args.body.as_deref())?;
+    let template = input::template(&args.body)?;
     input::create_dir(&args.out)?;
     let mut mirror = Mirror::new(template, source.calibration(), choices);
     mirror.set_off_person_interval(0.0);

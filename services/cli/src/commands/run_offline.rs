@@ -214,7 +214,7 @@ impl<'a> Animation<'a> {
             args,
             simulation,
             files,
-            painter: OutfitPainter::new(input::template(args.body.as_deref())?),
+            painter: OutfitPainter::new(input::template(&args.body)?),
             resumed,
             is_lost: false,
         };

@@ -24,7 +24,7 @@ use tryon::tracking::{
 /// Bad input, named; or results that cannot be written.
 pub(crate) fn run(args: &TrackArgs) -> Result<ExitCode> {
     let mut source = args.recording.open(&args.input)?;
-    let template = input::template_in(args.body.as_deref(), &args.frame.stated())?;
+    let template = input::template(&args.body)?;
     let model = TrackerModel::new(
         template,
         source.calibration().clone(),

@@ -28,7 +28,7 @@ const PICTURES: &str = "pictures";
 
 fn capture_all(args: &ClothcapCaptureArgs) -> Result<()> {
     let archive = CaptureArchive::new(&args.out)?;
-    let header = archive.header(&input::template(args.frame.body.as_deref())?)?;
+    let header = archive.header(&input::template(&args.frame.body)?)?;
     let mut scans = opened(args, header.as_ref())?;
     if let Some(h) = &header {
         ensure!(

@@ -17,10 +17,10 @@ use tryon::clothcap::settings::AlignmentSettings;
 use tryon::clothcap::texture::GarmentTexture;
 use tryon::clothcap::{BodyDresser, CapturedOutfit, DressedPose, population};
 use tryon::formats::image::{encode_png_rgb, write_png_rgb};
-use tryon::formats::npz::read_smpl;
 use tryon::formats::read_motion;
 use tryon::formats::scan::ScanMesh;
-use tryon::geometry::math::{P3, World};
+use tryon::geometry::math::World;
+use tryon::geometry::mesh::TriMesh;
 use tryon::geometry::par::with_threads;
 use tryon::synth::{Actor, Sequence, Setting};
 
@@ -127,7 +127,7 @@ impl Batch<'_> {
         let args = self.args;
         json!({
             "capture": args.capture,
-            "body": args.body,
+            "body": args.body.file(),
             "seed": args.seed,
             "motion": args.motion,
             "obj": args.obj,
@@ -289,11 +289,12 @@ struct NamedBody {
 
 /// Bodies of the command.
 fn bodies(args: &ClothcapRetargetArgs, template: &Arc<Template>) -> Result<Vec<NamedBody>> {
-    if let Some(path) = &args.body {
+    if let Some(path) = args.body.file() {
+        let body = input::template(&args.body)?;
         let name = path.file_stem().map(|s| s.to_string_lossy().into_owned());
         return Ok(vec![NamedBody {
             name: name.unwrap_or_else(|| "body".into()),
-            rest: other_body(path, template)?,
+            rest: fitted(body.mesh(), template).with_context(|| format!("{}", path.display()))?,
         }]);
     }
     let count = args.population.unwrap_or(0);
@@ -307,19 +308,15 @@ fn bodies(args: &ClothcapRetargetArgs, template: &Arc<Template>) -> Result<Vec<N
 }
 
 /// Body of another topology: the template fitted to its surface, in the rest pose.
-fn other_body(path: &Path, template: &Arc<Template>) -> Result<RestBody> {
-    let arrays = read_smpl(path)?;
+fn fitted(body: &TriMesh, template: &Arc<Template>) -> Result<RestBody> {
     let file = ScanMesh {
-        points: arrays.vertices.iter().map(|p| P3::from(*p)).collect(),
-        faces: arrays.faces.clone(),
+        points: body.vertices().to_vec(),
+        faces: body.faces().to_vec(),
         ..ScanMesh::default()
     };
-    let scan = BodyScan::new(&file, &ScanFrame::default())
-        .with_context(|| format!("{}", path.display()))?;
+    let scan = BodyScan::new(&file, &ScanFrame::default())?;
     let mut aligner = Aligner::new(template.clone(), AlignmentSettings::default())?;
-    aligner
-        .align(&scan)
-        .with_context(|| format!("{}", path.display()))?;
+    aligner.align(&scan)?;
     let clothed = aligner.clothed().context("no body was fitted")?;
     let shaped = template.personalise(&BodyShape {
         displacements: Vec::new(),

@@ -32,7 +32,7 @@ pub(super) struct Scans {
 impl Scans {
     /// Lists the scans and finds unit, up axis and person of the first one, as far as they are not given.
     pub(super) fn open(args: &ScanArgs) -> Result<Self> {
-        let template = input::template(args.frame.body.as_deref())?;
+        let template = input::template(&args.frame.body)?;
         let files = scan_files(&args.scans)?;
         let first = &files[0];
         let file = read_scan(first)?;
@@ -50,7 +50,7 @@ impl Scans {
     /// The same with a frame known from before; nothing is searched.
     pub(super) fn reopen(args: &ScanArgs, frame: ScanFrame) -> Result<Self> {
         Ok(Self {
-            template: input::template(args.frame.body.as_deref())?,
+            template: input::template(&args.frame.body)?,
             files: scan_files(&args.scans)?,
             frame,
             start: None,

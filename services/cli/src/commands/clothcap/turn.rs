@@ -37,7 +37,7 @@ struct TurnFile {
 /// # Errors
 /// A recording that cannot be read or shows nobody, named; or an output folder that holds another one.
 pub(super) fn fused(recording: &Path, args: &ClothcapCaptureArgs) -> Result<Scans> {
-    let template = input::template(args.frame.body.as_deref())?;
+    let template = input::template(&args.frame.body)?;
     let (scan, person) = (args.out.join(SCAN), args.out.join(PERSON));
     let options = format!("{:?}", args.recording);
     if !person.exists() {
