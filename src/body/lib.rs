@@ -18,7 +18,7 @@
 //!
 //! Garments from scans:
 //!
-//! - Pose blend shapes (eq. 1, 2): [`mod@pose_shapes`], [`mod@pose_offsets`].
+//! - Pose blend shapes (eq. 1, 2): [`mod@pose_features`], [`mod@pose_shapes`], [`mod@pose_offsets`].
 //! - Unposing (eq. 8): [`mod@skin_binding::posed_skin`].
 #![allow(rustdoc::private_intra_doc_links)] // the index of ideas names private modules
 
@@ -34,6 +34,7 @@ pub mod import;
 pub mod measure;
 pub mod parts;
 mod pose;
+mod pose_features;
 mod pose_offsets;
 mod pose_shapes;
 mod rig;

@@ -1,13 +1,13 @@
 //! Pose blend shapes in one pose, and posing with them.
 
-use super::pose_shapes::{ENTRIES, PoseShapes};
+use super::pose_features::push_features;
+use super::pose_shapes::PoseShapes;
 use super::skinning::{MovedRest, skin_moved};
 use super::{BoneTransforms, Skeleton, Template};
-use nalgebra::Matrix3;
 use tryon_geometry::math::{P3, V3};
 use tryon_geometry::par::{self, Par};
 
-/// Entries of R(θ) − I below which a joint is not turned: offsets of a nanometre. Larger values drop small corrections.
+/// Features below which a joint is not turned: offsets of a nanometre. Larger values drop small corrections.
 const NEGLIGIBLE: f32 = 1e-6;
 
 /// Pose blend shapes of a template in one pose.
@@ -46,17 +46,16 @@ fn dot(a: &[f32], b: &[f32]) -> f32 {
     sums.iter().sum::<f32>() + rest
 }
 
-/// Entries of R(θ) − I, shape `[features]`; `None` where no joint but the root is turned.
+/// Features of all joints but the root, shape `[features]`; `None` where no joint but the root is turned.
 fn features(shapes: &PoseShapes, skeleton: &Skeleton, bones: &BoneTransforms) -> Option<Vec<f32>> {
     let moving = skeleton.joints().iter().enumerate().skip(1);
     let mut out = Vec::with_capacity(shapes.features());
-    for (j, joint) in moving.take(shapes.features() / ENTRIES) {
+    for (j, joint) in moving.take(shapes.turned_joints()) {
         let rotation = match joint.parent {
             Some(p) => bones.bones[p].rotation.inverse() * bones.bones[j].rotation,
             None => bones.bones[j].rotation,
         };
-        let change = rotation.to_rotation_matrix().matrix() - Matrix3::identity();
-        out.extend(change.transpose().iter().map(|v| *v as f32));
+        push_features(shapes.feature(), &rotation, &mut out);
     }
     out.iter().any(|v| v.abs() > NEGLIGIBLE).then_some(out)
 }
@@ -86,21 +85,22 @@ impl Template {
 mod tests {
     use super::*;
     use crate::{BodyShape, Pose, embedded, skin};
-    use nalgebra::{Matrix4, Point3, Vector3};
+    use nalgebra::{Matrix3, Matrix4, Point3, Vector3};
     use rand::{Rng, SeedableRng};
     use rand_pcg::Pcg64Mcg;
+    use tryon_formats::PoseFeature;
     use tryon_geometry::math::{Rigid, World, exp_so3};
 
     const SIZE: f32 = 0.01;
 
     /// Embedded body with directions at random, of up to a centimetre an entry.
-    fn with_random_shapes(size: f32) -> Template {
+    fn with_random_shapes(size: f32, feature: PoseFeature) -> Template {
         let template = (*embedded::template()).clone();
         let (n, j) = (template.mesh().vertices().len(), template.skeleton().len());
         let mut rng = Pcg64Mcg::seed_from_u64(3);
-        let values = 0..n * 3 * ENTRIES * (j - 1);
+        let values = 0..n * 3 * feature.count() * (j - 1);
         let directions = values.map(|_| size * rng.random_range(-1.0..1.0f32));
-        let shapes = PoseShapes::new(n, j, directions.collect()).expect("sizes fit");
+        let shapes = PoseShapes::new([n, j], feature, directions.collect()).expect("sizes fit");
         template.with_pose_shapes(shapes).expect("sizes fit")
     }
 
@@ -115,11 +115,33 @@ mod tests {
         (pose, bones)
     }
 
-    /// SMPL's published formulas, term by term in f64: v = Σ w G (v̄ + posedirs · vec(R − I)), G from products of 4 × 4
-    /// transforms relative to the parent.
+    /// Features by the published formulas from the axis-angle vector θ: vec(R − I) of SMPL; (θ/|θ| sin ½|θ|, cos ½|θ| − 1) of
+    /// STAR.
+    fn published(feature: PoseFeature, theta: Vector3<f64>) -> Vec<f64> {
+        match feature {
+            PoseFeature::Matrix => {
+                let change = nalgebra::Rotation3::from_scaled_axis(theta).into_inner();
+                let change = change - Matrix3::identity();
+                (0..9).map(|k| change[(k / 3, k % 3)]).collect()
+            }
+            PoseFeature::Quaternion => {
+                let angle = theta.norm();
+                let axis = theta / angle.max(1e-12);
+                let axis = axis * (0.5 * angle).sin();
+                vec![axis.x, axis.y, axis.z, (0.5 * angle).cos() - 1.0]
+            }
+        }
+    }
+
     #[test]
     fn posed_vertices_follow_the_published_formulas() {
-        let template = with_random_shapes(SIZE);
+        check_published(PoseFeature::Matrix);
+        check_published(PoseFeature::Quaternion);
+    }
+
+    /// v = Σ w G (v̄ + posedirs · features), term by term in f64, G from products of 4 × 4 transforms relative to the parent.
+    fn check_published(feature: PoseFeature) {
+        let template = with_random_shapes(SIZE, feature);
         let (pose, bones) = bent(&template);
         let rest = template.personalise(&BodyShape::default());
         let skeleton = template.skeleton();
@@ -128,7 +150,7 @@ mod tests {
             nalgebra::Rotation3::from_scaled_axis(v).into_inner()
         };
         let mut global: Vec<Matrix4<f64>> = Vec::new();
-        let mut vec_r = Vec::new();
+        let mut features = Vec::new();
         for (j, joint) in skeleton.joints().iter().enumerate() {
             let before = joint
                 .parent
@@ -142,8 +164,7 @@ mod tests {
                 .map_or(pose.root.iso().to_homogeneous(), |p| global[p]);
             global.push(above * local);
             if j > 0 {
-                let change = turn(j) - Matrix3::identity();
-                vec_r.extend((0..9).map(|k| change[(k / 3, k % 3)]));
+                features.extend(published(feature, pose.rotation_vector(skeleton, j)));
             }
         }
         let mut posed = Vec::new();
@@ -153,8 +174,11 @@ mod tests {
         for (v, found) in posed.iter().enumerate().step_by(37) {
             let rows = shapes.rows(v);
             let offset = Vector3::from_fn(|c, _| {
-                let row = &rows[c * vec_r.len()..(c + 1) * vec_r.len()];
-                row.iter().zip(&vec_r).map(|(d, r)| f64::from(*d) * r).sum()
+                let row = &rows[c * features.len()..(c + 1) * features.len()];
+                row.iter()
+                    .zip(&features)
+                    .map(|(d, r)| f64::from(*d) * r)
+                    .sum()
             });
             moved = moved.max(offset.norm());
             let at = rest.vertices[v].coords.cast::<f64>() + offset;
@@ -173,8 +197,8 @@ mod tests {
 
     #[test]
     fn vanishing_shapes_give_the_bits_of_blend_skinning() {
-        let zero = with_random_shapes(0.0);
-        let some = with_random_shapes(SIZE);
+        let zero = with_random_shapes(0.0, PoseFeature::Matrix);
+        let some = with_random_shapes(SIZE, PoseFeature::Quaternion);
         let none = embedded::template();
         let rest = zero.personalise(&BodyShape::default()).vertices;
         let posed = |template: &Template, bones: &BoneTransforms| {
@@ -199,7 +223,7 @@ mod tests {
 
     #[test]
     fn shapes_of_another_body_are_refused() {
-        let other = PoseShapes::new(1, 2, vec![0.0; 27]).expect("sizes fit");
+        let other = PoseShapes::new([1, 2], PoseFeature::Matrix, vec![0.0; 27]).expect("sizes fit");
         let template = (*embedded::template()).clone();
         assert!(template.with_pose_shapes(other).is_err());
     }

@@ -1,32 +1,35 @@
-//! Pose blend shapes of a model (Loper et al. 2015, eq. 9; Bₚ of Pons-Moll et al. 2017, eq. 1): vertex offsets, linear in
-//! the entries of the joints' rotation matrices.
+//! Pose blend shapes of a model (Loper et al. 2015, eq. 9; Osman et al. 2020; Bₚ of Pons-Moll et al. 2017, eq. 1):
+//! vertex offsets, linear in features of the joints' rotations.
 
 use super::BodyError;
+use tryon_formats::PoseFeature;
 
-/// Entries of a rotation matrix.
-pub(super) const ENTRIES: usize = 9;
-
-/// Linear directions of pose: vertex offsets per entry of R(θ) − I of each joint but the root.
+/// Linear directions of pose: vertex offsets per feature of each joint but the root.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PoseShapes {
-    /// Entries of all joints but the root.
+    feature: PoseFeature,
+    /// Features of all joints but the root.
     features: usize,
     /// Metres, row-major, shape `[vertices][3][features]`.
     directions: Vec<f32>,
 }
 
 impl PoseShapes {
-    /// Directions as SMPL's `posedirs` has them: metres, row-major, shape `[vertices][3][9 (joints − 1)]`, entries of each
-    /// rotation matrix row by row.
+    /// Directions as `posedirs` has them: metres, row-major, shape `[vertices][3][feature.count() · (joints − 1)]`, for a
+    /// body of shape `[vertices, joints]`.
     ///
     /// # Errors
     /// Another number of values, or one that is not finite.
-    pub fn new(vertices: usize, joints: usize, directions: Vec<f32>) -> Result<Self, BodyError> {
+    pub fn new(
+        [vertices, joints]: [usize; 2],
+        feature: PoseFeature,
+        directions: Vec<f32>,
+    ) -> Result<Self, BodyError> {
         let fault = |why: String| BodyError::Array {
             array: "posedirs".into(),
             why,
         };
-        let features = ENTRIES * joints.saturating_sub(1);
+        let features = feature.count() * joints.saturating_sub(1);
         if directions.len() != vertices * 3 * features {
             return Err(fault(format!(
                 "{} values for {vertices} vertices and {joints} joints",
@@ -36,6 +39,7 @@ impl PoseShapes {
         match directions.iter().position(|d| !d.is_finite()) {
             Some(i) => Err(fault(format!("value {i} is not finite"))),
             None => Ok(Self {
+                feature,
                 features,
                 directions,
             }),
@@ -64,7 +68,17 @@ impl PoseShapes {
         self.directions.len() / (3 * self.features).max(1)
     }
 
-    /// Number of entries of all joints but the root.
+    /// Features of each joint.
+    pub(super) fn feature(&self) -> PoseFeature {
+        self.feature
+    }
+
+    /// Number of joints with features.
+    pub(super) fn turned_joints(&self) -> usize {
+        self.features / self.feature.count()
+    }
+
+    /// Number of features of all joints but the root.
     pub(super) fn features(&self) -> usize {
         self.features
     }
@@ -76,16 +90,22 @@ mod tests {
 
     #[test]
     fn arrays_that_do_not_fit_are_refused() {
-        assert!(PoseShapes::new(2, 3, vec![0.0; 5]).is_err());
-        assert!(PoseShapes::new(1, 2, vec![f32::NAN; 27]).is_err());
-        let shapes = PoseShapes::new(1, 2, vec![0.0; 27]).expect("sizes fit");
-        assert_eq!((shapes.vertices(), shapes.features()), (1, 9));
+        assert!(PoseShapes::new([2, 3], PoseFeature::Matrix, vec![0.0; 5]).is_err());
+        assert!(PoseShapes::new([1, 2], PoseFeature::Matrix, vec![f32::NAN; 27]).is_err());
+        let sizes = |feature: PoseFeature| {
+            let shapes = PoseShapes::new([1, 2], feature, vec![0.0; 3 * feature.count()]);
+            let shapes = shapes.expect("sizes fit");
+            (shapes.vertices(), shapes.features(), shapes.turned_joints())
+        };
+        assert_eq!(sizes(PoseFeature::Matrix), (1, 9, 1));
+        assert_eq!(sizes(PoseFeature::Quaternion), (1, 4, 1));
     }
 
     #[test]
     fn vertices_between_others_get_their_share() {
         let rows = (0..54).map(|k| if k < 27 { 1.0 } else { 3.0 });
-        let shapes = PoseShapes::new(2, 2, rows.collect()).expect("sizes fit");
+        let shapes =
+            PoseShapes::new([2, 2], PoseFeature::Matrix, rows.collect()).expect("sizes fit");
         let more = shapes.extended([([0, 1], 0.25)].into_iter());
         assert_eq!(more.vertices(), 3);
         assert!(more.rows(2).iter().all(|v| *v == 1.5));

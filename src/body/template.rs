@@ -1,7 +1,6 @@
 //! The body template: mesh, skeleton, weights and shape space of one body.
 
 use super::parts::BodyParts;
-use super::pose_shapes::ENTRIES;
 use super::{BodyError, Joint, PoseShapes, ShapeSpace, Skeleton, SkinWeights};
 use nalgebra::Point3;
 use std::sync::Arc;
@@ -126,7 +125,7 @@ impl Template {
         let (vertices, joints) = (self.mesh.vertices().len(), self.skeleton.len());
         let is_empty = shapes.features() == 0;
         let fits = is_empty || shapes.vertices() == vertices;
-        if !fits || shapes.features() > ENTRIES * (joints - 1) {
+        if !fits || shapes.turned_joints() >= joints {
             let why = format!("do not fit {vertices} vertices and {joints} joints");
             let array = "posedirs".into();
             return Err(BodyError::Array { array, why });

@@ -2,6 +2,7 @@
 
 use super::FormatError;
 use super::npz_file::{NpzArray, NpzFile};
+use super::pose_feature::PoseDirections;
 use std::path::Path;
 
 /// The root's parent in SMPL's tables (−1 stored as u32).
@@ -24,15 +25,12 @@ pub struct SmplArrays {
     pub joint_regressor: Vec<f32>,
     /// `shapedirs`: offsets per unit of each coefficient, metres, shape `(B, V)`; empty if absent.
     pub shape_directions: Vec<Vec<[f32; 3]>>,
-    /// `posedirs`: offsets per entry of R − I of each joint but the root, metres, row-major, shape `(V, 3, 9 (J − 1))`; empty
-    /// if absent.
-    pub pose_directions: Vec<f32>,
+    /// `posedirs`.
+    pub pose_directions: PoseDirections,
     /// `joint_names`, shape `(J)`; if absent SMPL's own names of the joints that all its layouts share, and numbers.
     pub joint_names: Vec<String>,
     /// The file has `joint_names`.
     pub has_names: bool,
-    /// Statements about what was left out.
-    pub notes: Vec<String>,
 }
 
 /// Names of SMPL's first 24 joints, in its order.
@@ -78,7 +76,7 @@ pub fn read_smpl(path: impl AsRef<Path>) -> Result<SmplArrays, FormatError> {
     let weights = weights.ok_or_else(|| a.missing("weights"))?;
     let regressor = a.shaped("J_regressor", &[j, n])?.unwrap_or_default();
     let joint_regressor: Vec<f32> = regressor.iter().map(|x| *x as f32).collect();
-    let (pose_directions, notes) = a.pose_directions(n, j)?;
+    let pose_directions = PoseDirections::read(&mut a, n, j)?;
     let joints = match a.shaped("J", &[j, 3])? {
         Some(joints) => joints.as_chunks::<3>().0.to_vec(),
         None if joint_regressor.is_empty() => {
@@ -93,12 +91,11 @@ pub fn read_smpl(path: impl AsRef<Path>) -> Result<SmplArrays, FormatError> {
         joints,
         joint_regressor,
         shape_directions: a.shape_directions(n)?,
-        pose_directions: pose_directions.iter().map(|x| *x as f32).collect(),
+        pose_directions,
         has_names: named.is_some(),
         joint_names: named.unwrap_or_else(|| default_names(j)),
         vertices,
         parents,
-        notes,
     })
 }
 
@@ -169,35 +166,6 @@ impl NpzFile<'_> {
         let direction = |d: usize| (0..vertices).map(|i| at(d, i)).collect();
         Ok((0..count).map(direction).collect())
     }
-    /// Directions of pose for R − I of each joint but the root; STAR's own are left out, with a note.
-    fn pose_directions(
-        &mut self,
-        vertices: usize,
-        joints: usize,
-    ) -> Result<(Vec<f64>, Vec<String>), FormatError> {
-        let Some(array) = self.numbers("posedirs")? else {
-            return Ok((Vec::new(), Vec::new()));
-        };
-        let (entries, quaternions) = (9 * (joints - 1), 4 * (joints - 1));
-        if array.shape == [vertices, 3, quaternions + 1]
-            || array.shape == [vertices, 3, quaternions]
-        {
-            let note = format!(
-                "`posedirs` has STAR's {} pose features (quaternions): read without pose blend shapes",
-                array.side(2)
-            );
-            return Ok((Vec::new(), vec![note]));
-        }
-        if array.shape == [vertices, 3, entries] {
-            return Ok((array.data, Vec::new()));
-        }
-        let why = format!(
-            "shape {:?}, expected [{vertices}, 3, {entries}] (rotation entries of {joints} joints), or STAR's [{vertices}, 3, {}]",
-            array.shape,
-            quaternions + 1
-        );
-        Err(self.fault("posedirs", why))
-    }
     fn joint_names(&mut self, joints: usize) -> Result<Option<Vec<String>>, FormatError> {
         let names = self.strings("joint_names")?;
         if let Some(names) = &names
@@ -246,6 +214,7 @@ pub fn regress(regressor: &[f32], points: &[[f32; 3]]) -> Vec<[f64; 3]> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::PoseFeature;
     use npyz::WriterBuilder;
 
     /// Writes a body of one triangle and one joint, with one array replaced.
@@ -309,13 +278,20 @@ mod tests {
         }
     }
 
-    /// STAR's pose features are quaternions and a shape coefficient: 4 · 23 + 1 for 24 joints, 1 for one.
+    /// STAR's pose features are quaternions and the second shape coefficient: 4 · 23 + 1 for 24 joints, 1 for one.
     #[test]
-    fn pose_directions_of_star_are_left_out_and_said() {
+    fn the_last_pose_direction_of_star_is_one_of_shape() {
         let dir = tempfile::tempdir().expect("dir");
-        let star = read_smpl(write(dir.path(), "posedirs", &[3, 3, 1], &[0.0; 9])).expect("valid");
-        assert!(star.pose_directions.is_empty() && star.notes[0].contains("STAR"));
-        assert!(!star.has_names);
+        let values: Vec<f64> = (0..9).map(f64::from).collect();
+        let file = write(dir.path(), "posedirs", &[3, 3, 1], &values);
+        let star = read_smpl(file).expect("valid");
+        assert_eq!(star.pose_directions.feature, PoseFeature::Quaternion);
+        assert!(star.pose_directions.of_pose.is_empty() && !star.has_names);
+        let second = &star.pose_directions.of_second_shape;
+        assert_eq!(
+            second[..],
+            [[0.0, 1.0, 2.0], [3.0, 4.0, 5.0], [6.0, 7.0, 8.0]]
+        );
     }
 
     #[test]

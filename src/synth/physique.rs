@@ -4,6 +4,7 @@ use super::settings::CoveringSettings;
 use tryon_body::import::template_from_smpl;
 use tryon_body::parts::{BodyPart, BodySegment};
 use tryon_body::{BodyError, BoneTransforms, Pose, RestBody, Template, skin};
+use tryon_formats::PoseDirections;
 use tryon_formats::npz::{SmplArrays, regress};
 use tryon_geometry::math::{Body, P3, Rigid};
 use tryon_geometry::mesh::smoothing::smoothed;
@@ -67,7 +68,7 @@ impl Physique {
     pub fn template(&self, name: &str, arrays: &SmplArrays) -> Result<Template, BodyError> {
         let mut arrays = SmplArrays {
             shape_directions: Vec::new(),
-            pose_directions: Vec::new(),
+            pose_directions: PoseDirections::default(),
             ..arrays.clone()
         };
         stand_on_floor(&mut arrays.vertices);

@@ -3,7 +3,9 @@
 use super::joint_names::{NamedJoints, centroid_below};
 use super::stature::{check_volume, unit_of_stature};
 use crate::human_joints::{JointTree, SideBasis};
+use crate::pose_features::turn_features;
 use nalgebra::{Matrix3, Point3, Vector3, center};
+use tryon_formats::PoseDirections;
 use tryon_formats::mesh_frame::{MeshAxis, MeshFrame, unit_name, upright_rotation};
 use tryon_formats::npz::SmplArrays;
 
@@ -11,8 +13,6 @@ use tryon_formats::npz::SmplArrays;
 const ALONG: f64 = 0.9;
 /// Component ahead of the feet's skin from the ankles, over the stature: people have 0.02 to 0.03.
 const TOES: f64 = 0.008;
-/// Entries of a rotation matrix.
-const ENTRIES: usize = 9;
 
 /// Map of a file's arrays to the project's frame.
 pub(super) struct BodyFrame {
@@ -105,7 +105,9 @@ impl BodyFrame {
                 .joints
                 .iter_mut()
                 .for_each(|p| *p = (map * Vector3::from(*p)).into());
-            self.turn_pose_directions(&mut arrays);
+            let directions = &mut arrays.pose_directions;
+            directions.of_second_shape.iter_mut().for_each(single);
+            self.turn_pose_directions(directions, arrays.parents.len());
         }
         if self.is_inside_out {
             arrays.faces.iter_mut().for_each(|f| f.swap(1, 2));
@@ -113,28 +115,23 @@ impl BodyFrame {
         arrays
     }
 
-    /// Offsets turn with the body, and so do the rotations whose entries they belong to: R = M R' Mᵀ.
-    fn turn_pose_directions(&self, arrays: &mut SmplArrays) {
-        let features = ENTRIES * arrays.parents.len().saturating_sub(1);
-        if arrays.pose_directions.is_empty() || features == 0 {
+    /// Offsets turn with the body, and so do the features that they belong to.
+    fn turn_pose_directions(&self, directions: &mut PoseDirections, joints: usize) {
+        let count = directions.feature.count();
+        let columns = count * joints.saturating_sub(1);
+        if directions.of_pose.is_empty() || columns == 0 {
             return;
         }
-        let m = self.matrix;
-        for vertex in arrays.pose_directions.chunks_exact_mut(3 * features) {
-            let own: Vec<f32> = vertex.to_vec();
-            for joint in 0..features / ENTRIES {
-                let block = |c: usize| {
-                    let at = c * features + joint * ENTRIES;
-                    let rows = Matrix3::from_row_slice(&own[at..at + ENTRIES]).map(f64::from);
-                    m * rows * m.transpose()
-                };
-                let blocks = [block(0), block(1), block(2)];
-                for c in 0..3 {
-                    let sum: Matrix3<f64> = (0..3).map(|k| blocks[k] * m[(c, k)]).sum();
-                    let at = c * features + joint * ENTRIES;
-                    for (k, value) in sum.transpose().iter().enumerate() {
-                        vertex[at + k] = (value * self.unit) as f32;
-                    }
+        let map = (self.matrix * self.unit).cast::<f32>();
+        for vertex in directions.of_pose.chunks_exact_mut(3 * columns) {
+            for of_joint in vertex.chunks_exact_mut(count) {
+                turn_features(directions.feature, &self.matrix, of_joint);
+            }
+            for k in 0..columns {
+                let at = [k, columns + k, 2 * columns + k];
+                let offset = map * Vector3::from(at.map(|i| vertex[i]));
+                for (i, value) in at.into_iter().zip(offset.iter()) {
+                    vertex[i] = *value;
                 }
             }
         }

@@ -102,7 +102,7 @@ fn pose_blend_shapes_turn_with_the_body() {
     let Some(mut right) = makehuman() else { return };
     let features = 9 * (right.parents.len() - 1);
     let count = right.vertices.len() * 3 * features;
-    right.pose_directions = (0..count)
+    right.pose_directions.of_pose = (0..count)
         .map(|k| ((k * 7919) % 1009) as f32 * 1e-6)
         .collect();
     let turn =
@@ -112,7 +112,7 @@ fn pose_blend_shapes_turn_with_the_body() {
     let mut file = mapped(&right, back * scale);
     let block = |v: usize, c: usize, j: usize| {
         let at = (v * 3 + c) * features + 9 * j;
-        Matrix3::from_row_slice(&right.pose_directions[at..at + 9]).map(f64::from)
+        Matrix3::from_row_slice(&right.pose_directions.of_pose[at..at + 9]).map(f64::from)
     };
     for v in (0..right.vertices.len()).step_by(997) {
         for j in 0..features / 9 {
@@ -121,7 +121,7 @@ fn pose_blend_shapes_turn_with_the_body() {
                 let entries = back * sum * back.transpose() * scale;
                 let at = (v * 3 + c) * features + 9 * j;
                 for (k, e) in entries.transpose().iter().enumerate() {
-                    file.pose_directions[at + k] = *e as f32;
+                    file.pose_directions.of_pose[at + k] = *e as f32;
                 }
             }
         }

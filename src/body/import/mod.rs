@@ -18,6 +18,7 @@ use super::{
     BodyError, Joint, JointMotion, PoseShapes, ShapeSpace, Skeleton, SkinWeights, Template,
 };
 use nalgebra::{Point3, Vector3};
+use tryon_formats::PoseDirections;
 use tryon_formats::npz::{SmplArrays, regress};
 use tryon_geometry::math::{P3, V3};
 use tryon_geometry::mesh::TriMesh;
@@ -95,10 +96,13 @@ pub fn template_from_smpl(name: &str, arrays: &SmplArrays) -> Result<Template, B
     }));
     let shape_space = (!arrays.shape_directions.is_empty()).then(|| shape_space(arrays, &ends));
     let template = Template::new(name, mesh, Skeleton::new(joints)?, weights, shape_space)?;
-    if arrays.pose_directions.is_empty() {
+    let PoseDirections {
+        feature, of_pose, ..
+    } = &arrays.pose_directions;
+    if of_pose.is_empty() {
         return Ok(template);
     }
-    template.with_pose_shapes(PoseShapes::new(n, j, arrays.pose_directions.clone())?)
+    template.with_pose_shapes(PoseShapes::new([n, j], *feature, of_pose.clone())?)
 }
 
 /// End point of a limb: a vertex of the surface.
@@ -166,19 +170,27 @@ fn end_points(arrays: &SmplArrays, weights: &SkinWeights, mesh: &TriMesh) -> Vec
 }
 
 /// Shape directions with the joints' share from the regressor, and the end points' from their vertices.
+///
+/// STAR's pose features have the second shape coefficient beside the rotations, so its offsets are the same in every pose:
+/// they belong to that direction, but not to the joints, which are regressed before.
 fn shape_space(arrays: &SmplArrays, ends: &[EndPoint]) -> ShapeSpace {
-    let directions = &arrays.shape_directions;
-    let joints = directions.iter().map(|d| {
-        let moved = regress(&arrays.joint_regressor, d)
-            .into_iter()
-            .map(Vector3::from);
-        moved
-            .chain(
-                ends.iter()
-                    .map(|e| Vector3::from(d[e.vertex].map(f64::from))),
-            )
-            .collect()
-    });
+    let mut directions = arrays.shape_directions.clone();
+    if let Some(second) = directions.get_mut(1) {
+        let more = &arrays.pose_directions.of_second_shape;
+        for (offset, more) in second.iter_mut().flatten().zip(more.iter().flatten()) {
+            *offset += more;
+        }
+    }
+    let joints = directions
+        .iter()
+        .zip(&arrays.shape_directions)
+        .map(|(whole, own)| {
+            let moved = regress(&arrays.joint_regressor, own).into_iter();
+            let end = |e: &EndPoint| Vector3::from(whole[e.vertex].map(f64::from));
+            let moved = moved.map(Vector3::from).chain(ends.iter().map(end));
+            moved.collect()
+        })
+        .collect();
     ShapeSpace {
         names: (0..directions.len())
             .map(|d| format!("shape_{d}"))
@@ -187,7 +199,7 @@ fn shape_space(arrays: &SmplArrays, ends: &[EndPoint]) -> ShapeSpace {
             .iter()
             .map(|d| d.iter().map(|o| V3::from(*o)).collect())
             .collect(),
-        joints: joints.collect(),
+        joints,
     }
 }
 
@@ -287,8 +299,9 @@ mod tests {
             .find(|v| plain.weights().dominant(*v) == elbow)
             .expect("a forearm");
         let features = 9 * (j - 1);
-        arrays.pose_directions = vec![0.0; n * 3 * features];
-        arrays.pose_directions[(vertex * 3 + 2) * features + 9 * (elbow - 1) + 1] = SIZE;
+        let mut of_pose = vec![0.0; n * 3 * features];
+        of_pose[(vertex * 3 + 2) * features + 9 * (elbow - 1) + 1] = SIZE;
+        arrays.pose_directions.of_pose = of_pose;
         let shaped = template_from_smpl("shaped", &arrays).expect("valid");
 
         let mut pose = Pose::<Body>::rest(shaped.skeleton(), Rigid::identity());
@@ -303,6 +316,33 @@ mod tests {
         let found = offsets.of(vertex);
         assert!((found - V3::z() * (SIZE * entry)).norm() < 1e-6, "{found}");
         assert_eq!(offsets.of(vertex + 1), V3::zeros());
+    }
+
+    /// The last column of STAR's `posedirs` moves the skin by the second coefficient of shape, in every pose, and no joint.
+    #[test]
+    fn the_second_shape_direction_of_star_has_its_pose_column() {
+        let Some(path) = makehuman("template.npz") else {
+            return;
+        };
+        const SIZE: f32 = 0.02;
+        let mut arrays = read_smpl(path).expect("readable");
+        let plain = template_from_smpl("plain", &arrays).expect("valid");
+        arrays.pose_directions.of_second_shape = vec![[0.0, SIZE, 0.0]; arrays.vertices.len()];
+        let star = template_from_smpl("star", &arrays).expect("valid");
+        let shape = BodyShape {
+            coefficients: vec![0.7, 1.5],
+            ..Default::default()
+        };
+        let (a, b) = (plain.personalise(&shape), star.personalise(&shape));
+        let mut moved = a.vertices.iter().zip(&b.vertices);
+        assert!(moved.all(|(p, q)| (q - p - V3::y() * (1.5 * SIZE)).norm() < 1e-6));
+        let known = arrays.joints.len();
+        assert_eq!(a.joints[..known], b.joints[..known]);
+        let tip = b.joints[known] - a.joints[known];
+        assert!(
+            (tip.y - 0.03).abs() < 1e-6,
+            "an end point is one of the skin"
+        );
     }
 
     #[test]

@@ -58,12 +58,17 @@ pub fn body_of_arrays(
     if !arrays.has_names {
         arrays.joint_names.clear();
     }
-    let mut notes = std::mem::take(&mut arrays.notes);
     let named = name_joints(&arrays)?;
     let frame = BodyFrame::find(&arrays, &named, stated).map_err(BodyFileError::Frame)?;
     let file_vertices = arrays.vertices.iter().map(|v| P3::from(*v)).collect();
     let mut arrays = frame.apply(arrays);
-    notes.extend(frame.notes.iter().cloned());
+    let mut notes = frame.notes.clone();
+    if !arrays.pose_directions.of_second_shape.is_empty() && arrays.shape_directions.len() < 2 {
+        notes.push(
+            "`posedirs` has offsets of a second shape coefficient that `shapedirs` lacks: left out"
+                .into(),
+        );
+    }
     notes.extend(adopt_names(&mut arrays, named, frame.is_mirrored()));
     let template = template_from_smpl(name, &arrays)?;
     notes.extend(openness(&template)?);

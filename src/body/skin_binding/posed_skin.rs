@@ -79,6 +79,7 @@ impl<'a> PosedSkin<'a> {
 mod tests {
     use super::*;
     use crate::{BodyShape, Pose, PoseShapes, embedded};
+    use tryon_formats::PoseFeature;
     use tryon_geometry::math::{Rigid, World};
     use tryon_geometry::par::Par;
 
@@ -114,7 +115,7 @@ mod tests {
         let (n, j) = (template.mesh().vertices().len(), template.skeleton().len());
         let values = 0..n * 27 * (j - 1);
         let directions = values.map(|k| 0.01 * (k as f32).sin()).collect();
-        let shapes = PoseShapes::new(n, j, directions).expect("sizes fit");
+        let shapes = PoseShapes::new([n, j], PoseFeature::Matrix, directions).expect("sizes fit");
         let worst = round_trip(&template.with_pose_shapes(shapes).expect("sizes fit"));
         assert!(worst.iter().all(|e| *e < 2e-6), "{worst:?}");
     }

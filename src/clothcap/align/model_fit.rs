@@ -380,6 +380,7 @@ pub(super) fn bare_vertices(template: &Template) -> Vec<bool> {
 mod tests {
     use super::*;
     use tryon_body::{PoseShapes, embedded};
+    use tryon_formats::PoseFeature;
     use tryon_geometry::math::Rigid;
 
     fn bent(template: &Template, elbow: f64) -> AlignedBody {
@@ -421,7 +422,7 @@ mod tests {
         };
         let directions = rows.clone().flat_map(smooth).collect();
         let n = rows.len();
-        let shapes = PoseShapes::new(n, j, directions).expect("sizes fit");
+        let shapes = PoseShapes::new([n, j], PoseFeature::Matrix, directions).expect("sizes fit");
         let shaped = plain.clone().with_pose_shapes(shapes).expect("sizes fit");
         let (without, with) = (error_of_pose(plain), error_of_pose(shaped));
         assert!(without < 5e-4 && with < 1e-3, "{without} {with}");
