@@ -59,6 +59,9 @@ pub struct FrameReport {
     /// Rows of the scan's file that are no point.
     #[serde(default)]
     pub left_out: LeftOut,
+    /// Changes of the scan's surface.
+    #[serde(default)]
+    pub notes: Vec<String>,
     /// Regions of the body that hardly any point shows; they get no garment.
     #[serde(default)]
     pub unseen: Vec<BodyRegion>,
@@ -265,6 +268,7 @@ impl OutfitCapture {
                 queries: fitted.queries,
                 vertices: fitted.vertex_counts,
                 left_out: scan.left_out,
+                notes: scan.notes.clone(),
                 unseen: unseen_regions(cloth.template(), matches, &self.config.labels.settings),
                 repeated: false,
             },

@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 use tryon_formats::TexturePoint;
 use tryon_formats::scan::ScanMesh;
 use tryon_geometry::math::{P3, V3};
-use tryon_geometry::mesh::{Csr, Face, edges, vertex_normals};
+use tryon_geometry::mesh::{Csr, Face, MeshRepairReport, edges, vertex_normals};
 use tryon_geometry::par::Par;
 
 /// Units of scans, metres: metre, centimetre, millimetre, inch, decimetre.
@@ -169,6 +169,8 @@ pub struct BodyScan {
     pub is_cloud: bool,
     /// Rows of the file that are no point.
     pub left_out: LeftOut,
+    /// Changes of its surface by the reader and here, faces named by line or number, for people.
+    pub notes: Vec<String>,
 }
 
 /// Counts of the rows of a file that are left out of its scan.
@@ -249,12 +251,24 @@ impl BodyScan {
             // Colours of some points only say nothing of the others.
             scan.colors.clear();
         }
-        let faces = file.faces.iter().filter_map(|f| scan.corners(f));
-        let distinct = |f: &Face| f[0] != f[1] && f[1] != f[2] && f[0] != f[2];
-        scan.faces = faces.filter(distinct).collect();
+        scan.take_faces(file);
         scan.texture = scan.texture_of(file);
         scan.find_normals(&settings.cloud);
         Ok(scan)
+    }
+
+    /// Takes the faces of a file whose points are known; those that lost a corner or collapsed are left out and noted.
+    fn take_faces(&mut self, file: &ScanMesh) {
+        let mut report = MeshRepairReport::default();
+        for (number, face) in (0..).zip(&file.faces) {
+            match self.corners(face) {
+                Some([a, b, c]) if a != b && b != c && a != c => self.faces.push([a, b, c]),
+                Some(_) => report.collapsed.add(number),
+                None => report.cut.add(number),
+            }
+        }
+        let clauses = report.clauses(|face| file.origins.place(face as usize));
+        self.notes = [&file.notes[..], &clauses].concat();
     }
 
     /// Leaves out some points; the number of rows that had one of them.
@@ -474,6 +488,11 @@ mod tests {
         let mut corners = scan.faces[0];
         corners.sort_unstable();
         assert_eq!((scan.faces.len(), corners), (1, [8, 9, 10]));
+        let [collapsed, cut] = &scan.notes[..] else {
+            panic!("{:?}", scan.notes)
+        };
+        assert!(collapsed.starts_with("1 face ") && collapsed.ends_with("(face 1)"));
+        assert!(cut.starts_with("1 face ") && cut.ends_with("(face 0)"));
         let labels: Vec<u8> = (0..scan.points.len()).map(|i| (i % 3) as u8).collect();
         let rows = scan.rows(&labels, 255);
         assert_eq!((rows[7], rows[8] == rows[9]), (255, true));

@@ -28,7 +28,7 @@ fn capture(folder: &Path) {
         faces: Vec::new(),
         normals: scan.normals,
         colors: scan.colors,
-        texture: Vec::new(),
+        ..ScanMesh::default()
     };
     let (frame, start) = find_frame(&template, &file).expect("a person");
     let labels = LabelConfig {

@@ -115,7 +115,7 @@ fn mesh_of(scan: &TrueScan) -> ScanMesh {
         faces: Vec::new(),
         normals: scan.normals.clone(),
         colors: scan.colors.clone(),
-        texture: Vec::new(),
+        ..ScanMesh::default()
     }
 }
 
@@ -127,7 +127,7 @@ fn keep(file: &ScanMesh, labels: &[u8], wanted: impl Fn(usize) -> bool) -> (Scan
         normals: rows.iter().map(|i| file.normals[*i]).collect(),
         colors: rows.iter().map(|i| file.colors[*i]).collect(),
         faces: Vec::new(),
-        texture: Vec::new(),
+        ..ScanMesh::default()
     };
     (mesh, rows.iter().map(|i| labels[*i]).collect())
 }

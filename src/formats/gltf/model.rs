@@ -34,6 +34,10 @@ pub(crate) struct GltfScan {
     pub(crate) colors: Vec<[f32; 3]>,
     /// Colours of the textures between the vertices.
     pub(crate) texture: Vec<TexturePoint>,
+    /// Part of each triangle.
+    pub(crate) origins: FaceOrigins,
+    /// Elements left out, for people.
+    pub(crate) notes: Vec<String>,
 }
 
 /// Reads all triangles of the default scene at rest: transforms of nodes, morph weights, skins and instances applied.
@@ -84,6 +88,8 @@ pub(crate) fn read_gltf_scan(path: &Path) -> Result<GltfScan, FormatError> {
         faces: scene.faces,
         colors: scene.colors,
         texture: scene.texture,
+        origins: origins(&scene.parts),
+        notes: scene.notes,
     })
 }
 
@@ -94,21 +100,25 @@ impl GltfModel {
             true => Vec::new(),
             false => self.mesh.faces().to_vec(),
         };
-        let faces = (0u32..).zip(&self.parts).flat_map(|(part, p)| {
-            let origin = FaceOrigin { part, line: 0 };
-            p.faces.clone().map(move |_| origin)
-        });
-        let origins = FaceOrigins {
-            faces: faces.collect(),
-            parts: self.parts.iter().map(|p| p.names.clone()).collect(),
-        };
         ObjMesh {
+            origins: origins(&self.parts),
             mesh: self.mesh,
             uv: self.uv,
             face_uv,
-            origins,
             notes: self.notes,
             ..ObjMesh::default()
         }
+    }
+}
+
+/// Part of each triangle of a model.
+fn origins(parts: &[GltfPart]) -> FaceOrigins {
+    let faces = (0u32..).zip(parts).flat_map(|(part, p)| {
+        let origin = FaceOrigin { part, line: 0 };
+        p.faces.clone().map(move |_| origin)
+    });
+    FaceOrigins {
+        faces: faces.collect(),
+        parts: parts.iter().map(|p| p.names.clone()).collect(),
     }
 }

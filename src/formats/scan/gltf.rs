@@ -18,5 +18,7 @@ pub(super) fn read_scene(path: &Path) -> Result<ScanMesh, FormatError> {
         normals: Vec::new(),
         colors: quantized(&scan.colors, 255.0),
         texture: scan.texture,
+        origins: scan.origins,
+        notes: scan.notes,
     })
 }

@@ -1,6 +1,6 @@
 //! Triangle mesh of a coloured scan, as its file stores it.
 
-use crate::TexturePoint;
+use crate::{FaceOrigins, TexturePoint};
 use tryon_geometry::math::{P3, V3};
 use tryon_geometry::mesh::Face;
 
@@ -21,4 +21,8 @@ pub struct ScanMesh {
     pub colors: Vec<[u8; 3]>,
     /// Colours of the texture between the vertices; empty without a texture, and where vertices have colours of their own.
     pub texture: Vec<TexturePoint>,
+    /// Part and line of each face; empty for formats without.
+    pub origins: FaceOrigins,
+    /// Elements that the reader changed or left out, for people.
+    pub notes: Vec<String>,
 }

@@ -35,5 +35,7 @@ pub(super) fn read_obj_scan(path: &Path) -> Result<ScanMesh, FormatError> {
         normals: Vec::new(),
         colors,
         texture,
+        origins: records.origins,
+        notes: records.notes,
     })
 }

@@ -16,7 +16,7 @@ fn square() -> ScanMesh {
         faces: vec![[0, 1, 2], [0, 2, 3]],
         normals: vec![V3::z(), V3::x(), V3::y(), -V3::z()],
         colors: vec![[0, 1, 2], [255, 254, 253], [128, 7, 9], [10, 20, 30]],
-        texture: Vec::new(),
+        ..ScanMesh::default()
     }
 }
 

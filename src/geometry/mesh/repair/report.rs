@@ -16,11 +16,19 @@ pub struct FaceFinding {
 
 impl FaceFinding {
     /// Adds a face.
-    pub(super) fn add(&mut self, face: u32) {
+    pub fn add(&mut self, face: u32) {
         self.count += 1;
         if self.first.len() < NAMED {
             self.first.push(face);
         }
+    }
+    /// Places of the first faces, in brackets; `place` names a face.
+    fn places(&self, place: &dyn Fn(u32) -> String) -> String {
+        let mut names: Vec<String> = self.first.iter().map(|f| place(*f)).collect();
+        let more = if self.count > names.len() { " …" } else { "" };
+        // Triangles of one polygon have one place.
+        names.dedup();
+        format!("({}{more})", names.join(", "))
     }
 }
 
@@ -39,6 +47,8 @@ pub struct MeshRepairReport {
     pub edges: FaceFinding,
     /// Vertices at which sheets met in a point, split.
     pub vertices: usize,
+    /// Faces with a vertex that is left out of the surface, removed.
+    pub cut: FaceFinding,
     /// Vertices without a face, removed.
     pub stray: usize,
     /// Faces whose orientation was reversed.
@@ -56,17 +66,7 @@ impl MeshRepairReport {
     }
     /// One clause a change; `place` names a face of the given mesh.
     pub fn clauses(&self, place: impl Fn(u32) -> String) -> Vec<String> {
-        let at = |finding: &FaceFinding| {
-            let mut names: Vec<String> = finding.first.iter().map(|f| place(*f)).collect();
-            let more = if finding.count > names.len() {
-                " …"
-            } else {
-                ""
-            };
-            // Triangles of one polygon have one place.
-            names.dedup();
-            format!("({}{more})", names.join(", "))
-        };
+        let at = |finding: &FaceFinding| finding.places(&place);
         let mut out = Vec::new();
         let mut say = |n: usize, one: &str, many: &str, rest: String| {
             if n > 0 {
@@ -82,6 +82,8 @@ impl MeshRepairReport {
         );
         let collapsed = format!("that joining collapsed removed {}", at(&self.collapsed));
         say(self.collapsed.count, "face", "faces", collapsed);
+        let cut = format!("with a vertex that is left out removed {}", at(&self.cut));
+        say(self.cut.count, "face", "faces", cut);
         let repeated = format!("removed {}", at(&self.repeated));
         say(
             self.repeated.count,

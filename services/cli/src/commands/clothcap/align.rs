@@ -41,6 +41,8 @@ fn align_all(args: &ClothcapAlignArgs) -> Result<()> {
         rows.push(json!({
             "scan": name,
             "points": scan.points.len(),
+            "left_out": scan.left_out,
+            "notes": scan.notes,
             "alignment": aligned.report,
             "shape": aligned.body.shape,
             "ms": started.elapsed().as_secs_f64() * 1e3,

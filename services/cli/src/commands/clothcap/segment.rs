@@ -40,7 +40,12 @@ fn segment_all(args: &ClothcapSegmentArgs) -> Result<()> {
             &labels,
             &args.out.join(format!("{}.ply", Scans::name(file))),
         )?;
-        rows.push(json!({"scan": Scans::name(file), "points": scan.points.len()}));
+        rows.push(json!({
+            "scan": Scans::name(file),
+            "points": scan.points.len(),
+            "left_out": scan.left_out,
+            "notes": scan.notes,
+        }));
         bar.inc(1);
     }
     bar.finish_and_clear();
