@@ -234,7 +234,10 @@ fn a_session_is_simulated_cancelled_and_continued() {
     assert_eq!((frames, times.len()), (1, 1));
     assert!((1000..=4000).contains(&vertices), "{vertices}");
     let glb = read_glb(&folder.join("outfit.glb")).unwrap();
-    assert_eq!((glb.parts.len(), glb.parts[0].name.as_str()), (1, "skirt"));
+    assert_eq!(
+        (glb.parts.len(), glb.parts[0].names.group.as_str()),
+        (1, "skirt")
+    );
 
     let (before, after, times) = eventually(|| {
         let (before, command) = cancelled(&tryon)?;

@@ -109,7 +109,7 @@ fn a_worn_garment_is_animated_on_its_body_and_resumes_to_the_same_bits() {
     assert_eq!(morph_targets(&whole[2]), expected);
     let glb = read_glb(&folder.join("outfit.glb")).unwrap();
     let (skin, points) = (&glb.parts[1], glb.mesh.vertices());
-    assert!(skin.name == "body" && skin.color != glb.parts[0].color);
+    assert!(skin.names.group == "body" && skin.color != glb.parts[0].color);
     let drawn = &points[points.len() - vertices..];
     let flat: Vec<f32> = drawn.iter().flat_map(|p| [p.x, p.y, p.z]).collect();
     assert_eq!(flat, body[..3 * vertices], "the first frame");

@@ -12,15 +12,15 @@ use std::path::Path;
 /// Contents of the buffers of a document.
 pub(super) struct Buffers {
     buffers: Vec<Vec<u8>>,
-    /// Decompressed contents of buffer views.
-    views: HashMap<usize, Vec<u8>>,
+    /// Decompressed contents of buffer views, or their faults.
+    views: HashMap<usize, Result<Vec<u8>, String>>,
 }
 
 impl Buffers {
     /// Reads the buffers; `blob` is the binary chunk, external buffers lie beside `origin`.
     ///
     /// # Errors
-    /// Names the buffer or view at fault.
+    /// Names the buffer at fault.
     pub(super) fn read(
         document: &Document,
         json: &Value,
@@ -47,10 +47,8 @@ impl Buffers {
             }
             buffers.push(data);
         }
-        let views = meshopt::decoded_views(json, &buffers);
-        let fault = |(view, why)| FormatError::field(origin, format!("buffer view {view}"), why);
         Ok(Self {
-            views: views.map_err(fault)?,
+            views: meshopt::decoded_views(json, &buffers),
             buffers,
         })
     }
@@ -58,7 +56,7 @@ impl Buffers {
     /// Bytes of a buffer view.
     pub(super) fn view(&self, view: &View<'_>) -> Result<&[u8], String> {
         if let Some(decoded) = self.views.get(&view.index()) {
-            return Ok(decoded);
+            return decoded.as_deref().map_err(Clone::clone);
         }
         let buffer = self
             .buffers

@@ -1,5 +1,6 @@
 //! Primitives compressed by Draco: extension KHR_draco_mesh_compression. The crate draco-core decodes the bitstream.
 
+use super::accessor_index::accessor_at;
 use super::buffers::Buffers;
 use ::gltf::accessor::DataType;
 use ::gltf::{Accessor, Document};
@@ -65,7 +66,7 @@ impl DracoReader<'_> {
             .nth(view)
             .ok_or("no such buffer view")?;
         let mesh = decoded(self.buffers.view(&view)?)?;
-        if let Some(a) = self.accessor(self.primitive.get("indices"))? {
+        if let Some(a) = accessor_at(self.document, self.primitive.get("indices"))? {
             let corners = mesh.faces().iter().flatten();
             let corners: Vec<f64> = corners.map(|p| f64::from(p.0)).collect();
             out.insert(a.index(), rows(&a, &corners)?);
@@ -73,7 +74,7 @@ impl DracoReader<'_> {
         let attributes = self.extension.get("attributes").and_then(Value::as_object);
         for (name, id) in attributes.into_iter().flatten() {
             let own = self.primitive.get("attributes").and_then(|a| a.get(name));
-            let Some(a) = self.accessor(own)? else {
+            let Some(a) = accessor_at(self.document, own)? else {
                 continue;
             };
             let id = index(Some(id)).and_then(|id| u32::try_from(id).ok());
@@ -89,17 +90,6 @@ impl DracoReader<'_> {
             out.insert(a.index(), rows(&a, &values)?);
         }
         Ok(())
-    }
-
-    /// Accessor of an index; `None` where there is none.
-    fn accessor(&self, value: Option<&Value>) -> Result<Option<Accessor<'_>>, String> {
-        let Some(value) = value else {
-            return Ok(None);
-        };
-        let found = index(Some(value)).and_then(|i| self.document.accessors().nth(i));
-        found
-            .map(Some)
-            .ok_or_else(|| format!("accessor {value} does not exist"))
     }
 }
 

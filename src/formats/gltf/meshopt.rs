@@ -25,24 +25,21 @@ pub(super) fn is_fallback(json: &Value, buffer: usize) -> bool {
     fallback.and_then(Value::as_bool).unwrap_or(false)
 }
 
-/// Decompressed contents of the buffer views that have the extension, by their index.
-///
-/// # Errors
-/// The buffer view at fault, and the fault.
+/// Decompressed contents of the buffer views that have the extension, by their index, or their fault: of a view that is not
+/// read a fault is of no matter.
 pub(super) fn decoded_views(
     json: &Value,
     buffers: &[Vec<u8>],
-) -> Result<HashMap<usize, Vec<u8>>, (usize, String)> {
+) -> HashMap<usize, Result<Vec<u8>, String>> {
     let mut out = HashMap::new();
     let views = json.get("bufferViews").and_then(Value::as_array);
     for (index, view) in views.into_iter().flatten().enumerate() {
         if let Some(extension) = extension(view) {
-            let decoded = decoded(extension, buffers);
-            let fault = |why| (index, format!("meshopt compression: {why}"));
-            out.insert(index, decoded.map_err(fault)?);
+            let fault = |why| format!("buffer view {index}: meshopt compression: {why}");
+            out.insert(index, decoded(extension, buffers).map_err(fault));
         }
     }
-    Ok(out)
+    out
 }
 
 /// Decompressed contents of one buffer view.
@@ -72,9 +69,11 @@ fn decoded(extension: &Value, buffers: &[Vec<u8>]) -> Result<Vec<u8>, String> {
         None | Some("NONE") => {}
         Some("EXPONENTIAL") => filters::exponential(&mut out),
         Some("QUATERNION") => filters::quaternion(&mut out),
-        // Normals, tangents and colours, which are not read.
-        Some("OCTAHEDRAL" | "COLOR") => {}
-        Some(other) => return Err(format!("filter `{other}` is not known")),
+        Some(other) => {
+            return Err(format!(
+                "filter `{other}` is not read; export without filters"
+            ));
+        }
     }
     Ok(out)
 }

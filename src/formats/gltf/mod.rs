@@ -1,5 +1,6 @@
 //! Meshes as glTF 2.0: writes `.glb` with materials, skins and motion; reads `.glb` and `.gltf`.
 
+mod accessor_index;
 mod accessors;
 mod base_colors;
 mod buffers;

@@ -6,8 +6,6 @@ use std::ops::Range;
 /// One primitive of a model.
 #[derive(Clone, Debug, PartialEq)]
 pub struct GltfPart {
-    /// Name of its mesh.
-    pub name: String,
     /// Names of its node, mesh and material.
     pub names: PartName,
     /// Its faces in the mesh of the model.

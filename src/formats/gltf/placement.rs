@@ -1,5 +1,6 @@
 //! Places of glTF nodes in the scene, and of the instances of a mesh (EXT_mesh_gpu_instancing).
 
+use super::accessor_index::accessor_at;
 use super::file::GltfFile;
 use ::gltf::Node;
 use nalgebra::{Matrix4, Quaternion, Translation3, UnitQuaternion, Vector3};
@@ -57,17 +58,17 @@ pub(super) fn instances(file: &GltfFile, node: usize) -> Result<Vec<Matrix4<f32>
     let Some(extension) = file.extension("nodes", node, INSTANCES) else {
         return Ok(vec![Matrix4::identity()]);
     };
-    let accessor = |name: &str| {
-        let index = extension.get("attributes")?.get(name)?.as_u64()?;
-        file.document.accessors().nth(usize::try_from(index).ok()?)
-    };
     let fault = |name: &str, why: String| format!("{INSTANCES}: {name}: {why}");
+    let accessor = |name: &str| {
+        let index = extension.get("attributes").and_then(|a| a.get(name));
+        accessor_at(&file.document, index).map_err(|why| fault(name, why))
+    };
     let read3 = |name: &str| {
-        let rows = accessor(name).map(|a| file.accessors.floats::<3>(&a));
+        let rows = accessor(name)?.map(|a| file.accessors.floats::<3>(&a));
         rows.transpose().map_err(|why| fault(name, why))
     };
     let (moved, scaled) = (read3("TRANSLATION")?, read3("SCALE")?);
-    let turned = accessor("ROTATION").map(|a| file.accessors.floats::<4>(&a));
+    let turned = accessor("ROTATION")?.map(|a| file.accessors.floats::<4>(&a));
     let turned = turned.transpose().map_err(|why| fault("ROTATION", why))?;
 
     let lengths = [

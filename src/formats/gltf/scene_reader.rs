@@ -255,7 +255,6 @@ impl<'a> SceneReader<'a> {
         }
         let material = p.material();
         self.out.parts.push(GltfPart {
-            name: placed.names.group.clone(),
             names: placed.names.clone(),
             faces: first..self.out.faces.len(),
             color: material.pbr_metallic_roughness().base_color_factor(),

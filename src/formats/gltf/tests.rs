@@ -48,7 +48,7 @@ fn written_meshes_read_back() {
         (FACES[3], [4, 6, 5], UV[2])
     );
     assert_eq!(
-        (m.parts[1].name.as_str(), m.parts[1].faces.clone()),
+        (m.parts[1].names.group.as_str(), m.parts[1].faces.clone()),
         ("skirt", 4..8)
     );
     assert!(
