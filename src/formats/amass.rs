@@ -7,7 +7,7 @@ use super::FormatError;
 use super::motion_clip::MotionClip;
 use super::npz::SMPL_JOINT_NAMES;
 use super::npz_file::NpzFile;
-use nalgebra::{Rotation3, UnitQuaternion};
+use nalgebra::UnitQuaternion;
 use std::f64::consts::FRAC_PI_2;
 use std::path::Path;
 use tryon_geometry::math::{P3d, V3d};
@@ -195,8 +195,7 @@ fn places(row: &[f64], at: V3d, upright: &UnitQuaternion<f64>) -> Vec<P3d> {
     let mut turns: Vec<UnitQuaternion<f64>> = Vec::with_capacity(BODY);
     let mut out: Vec<P3d> = Vec::with_capacity(BODY + ENDS.len());
     for ((parent, offset), vector) in FIGURE.iter().zip(row.as_chunks::<NUMBERS>().0) {
-        let turn =
-            UnitQuaternion::from_rotation_matrix(&Rotation3::from_scaled_axis(V3d::from(*vector)));
+        let turn = UnitQuaternion::from_scaled_axis(V3d::from(*vector));
         let (place, turn) = match parent {
             None => (P3d::from(upright * at), upright * turn),
             Some(p) => (

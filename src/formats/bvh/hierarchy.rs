@@ -14,7 +14,7 @@ const MAX_CHANNELS: usize = 9;
 pub(super) enum Channel {
     Position(usize),
     Rotation(usize),
-    /// Read over: bones keep their lengths.
+    /// Left out: bones keep their lengths.
     Scale,
 }
 

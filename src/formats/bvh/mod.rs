@@ -50,6 +50,15 @@ pub(super) fn parse_bvh(text: &str, origin: &Path) -> Result<MotionClip, FormatE
             roots.join(", ")
         ));
     }
+    let scaled = joints
+        .iter()
+        .filter(|j| j.channels.contains(&Channel::Scale));
+    let scaled = scaled.count();
+    if scaled > 0 {
+        notes.push(format!(
+            "scale channels of {scaled} joints left out: bones keep their lengths"
+        ));
+    }
     let mut values: Vec<Vec<f64>> = Vec::new();
     while values.len() < stated || !w.is_at_end() {
         let row = frame_values(&mut w, &joints, values.len(), stated)?;
