@@ -88,6 +88,22 @@ fn deviation(value: f64, [mean, deviation]: [f64; 2]) -> f64 {
     0.5 * ((value - mean) / deviation).powi(2)
 }
 
+/// Hints of a chain's names. Of joints that say the same the first is meant: `lwrist` before `lhand`, `upperleg01` before
+/// `upperleg02`.
+fn hints_along(tree: &JointTree<'_>, chain: &[usize]) -> Vec<Option<JointHint>> {
+    let mut out: Vec<Option<JointHint>> = Vec::with_capacity(chain.len());
+    for joint in chain {
+        let said = hints::joint(tree.name(*joint));
+        let is_repeated = said.is_some() && out.contains(&said);
+        out.push(if is_repeated {
+            Some(JointHint::Twist)
+        } else {
+            said
+        });
+    }
+    out
+}
+
 /// The cheapest choice of three joints on the limb that hangs from `start`; `None` for chains of fewer joints.
 pub(super) fn fit(branches: &Branches<'_>, start: usize, kind: &LimbKind) -> Option<LimbChain> {
     let (tree, children) = (branches.tree, &branches.children);
@@ -98,17 +114,7 @@ pub(super) fn fit(branches: &Branches<'_>, start: usize, kind: &LimbKind) -> Opt
         sum += tree.bone(*joint);
         along.push(sum);
     }
-    // Of joints that say the same, the first is meant: `lwrist` before `lhand`, `upperleg01` before `upperleg02`.
-    let mut hint: Vec<Option<JointHint>> = Vec::with_capacity(chain.len());
-    for joint in &chain {
-        let said = hints::joint(tree.name(*joint));
-        let is_repeated = said.is_some() && hint.contains(&said);
-        hint.push(if is_repeated {
-            Some(JointHint::Twist)
-        } else {
-            said
-        });
-    }
+    let hint = hints_along(tree, &chain);
     let has_fingers = |place: usize| {
         children[chain[place]]
             .iter()

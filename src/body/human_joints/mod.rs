@@ -112,8 +112,7 @@ impl HumanJoints {
     fn between(branches: &Branches<'_>, legs: &LimbPair, arms: &LimbPair) -> Self {
         let tree = branches.tree;
         let head = head_chain(branches, legs, arms);
-        let to_arms = tree.way(legs.parent, arms.parent);
-        let mut spine = to_arms;
+        let mut spine = tree.way(legs.parent, arms.parent);
         if let Some(start) = head.first() {
             let from = tree.parents[*start].unwrap_or(arms.parent);
             spine.extend(tree.way(arms.parent, from));
@@ -220,7 +219,7 @@ fn skull(branches: &Branches<'_>, chain: &[usize]) -> usize {
     let branching = chain.iter().position(|j| branches.children[*j].len() > 1);
     let is_end = |j: &usize| {
         let name = tree.name(*j).to_ascii_lowercase();
-        ["_end", "nub", "site", "top", "tip", "end"]
+        ["nub", "site", "top", "tip", "end"]
             .iter()
             .any(|e| name.ends_with(e))
     };

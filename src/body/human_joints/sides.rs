@@ -10,8 +10,9 @@ use nalgebra::{Point3, Vector3, center};
 /// but little.
 const BEND: f64 = 0.5;
 
-/// Evidence that decides against names, and without them; feet of a standing person give 0.3.
+/// Evidence that decides against names; feet of a standing person give 0.3.
 const SURE: f64 = 0.1;
+/// Evidence that decides without names; bends of nearly straight limbs give less.
 const SEEN: f64 = 0.03;
 
 /// Sum over frames of the evidence that the first limb of each pair is the left one.
@@ -22,7 +23,7 @@ pub struct SideEvidence {
 }
 
 impl SideEvidence {
-    /// Adds joints' places in one pose; `up`: the body's own, from pelvis to chest.
+    /// Adds joints' places in one pose.
     pub fn add(&mut self, joints: &HumanJoints, places: &[Point3<f64>]) {
         let middle =
             |pair: &[LimbChain; 2]| center(&places[pair[0].root()], &places[pair[1].root()]);

@@ -1,12 +1,12 @@
 //! Unit, axes and handedness of a body's arrays, from its joints and its skin; and the arrays in metres, y up, facing +z.
 
 use super::joint_names::{NamedJoints, centroid_below};
-use super::stature::{check_volume, unit_of_stature};
+use super::stature::{check_volume, unit_note, unit_of_stature};
 use crate::human_joints::{JointTree, SideBasis};
 use crate::pose_features::turn_features;
 use nalgebra::{Matrix3, Point3, Vector3, center};
 use tryon_formats::PoseDirections;
-use tryon_formats::mesh_frame::{MeshAxis, MeshFrame, unit_name, upright_rotation};
+use tryon_formats::mesh_frame::{MeshAxis, MeshFrame, upright_rotation};
 use tryon_formats::npz::SmplArrays;
 
 /// Cosine from an axis up to which a body stands along it: a lean of 25°.
@@ -36,7 +36,6 @@ impl BodyFrame {
         named: &NamedJoints,
         stated: &MeshFrame,
     ) -> Result<Self, String> {
-        let mut notes = Vec::new();
         let (up, lateral) = directions(arrays, named);
         let up = axis(stated.options.up, up, stated.up)?;
         let facing = facing(arrays, named, Vector3::from(up.vector()), lateral, stated)?;
@@ -44,13 +43,7 @@ impl BodyFrame {
             .ok_or_else(|| format!("its {up} up and {facing} ahead lie along one axis"))?;
         let stature = extent(arrays, Vector3::from(up.vector()));
         let unit = unit_of_stature(stature, stated)?;
-        if (unit - 1.0).abs() > 1e-9 {
-            notes.push(format!(
-                "in {}: stature {stature:.1} is {:.2} m",
-                unit_name(unit),
-                stature * unit
-            ));
-        }
+        let mut notes = Vec::from_iter(unit_note(stature, unit));
         if (up, facing) != (MeshAxis::Y, MeshAxis::Z) {
             notes.push(format!(
                 "{up} up, facing {facing}: turned to y up, facing z"

@@ -1,8 +1,8 @@
 //! Unit and axes of a standing body without joints, from its surface: a person is the same left and right, has two legs
 //! below and one head above, and feet that point ahead.
 
-use super::stature::{check_volume, unit_of_stature};
-use tryon_formats::mesh_frame::{MeshAxis, MeshFrame, unit_name};
+use super::stature::{check_volume, unit_note, unit_of_stature};
+use tryon_formats::mesh_frame::{MeshAxis, MeshFrame};
 use tryon_geometry::math::P3;
 use tryon_geometry::mesh::TriMesh;
 use tryon_geometry::spatial::PointTree;
@@ -81,14 +81,7 @@ impl StandingFrame {
         let unit = unit_of_stature(stature, stated)?;
         let volume = mesh.volume() * unit.powi(3);
         check_volume(volume.abs(), stature * unit)?;
-        let mut notes = Vec::new();
-        if (unit - 1.0).abs() > 1e-9 {
-            notes.push(format!(
-                "in {}: stature {stature:.1} is {:.2} m",
-                unit_name(unit),
-                stature * unit
-            ));
-        }
+        let mut notes = Vec::from_iter(unit_note(stature, unit));
         if (up, facing) != (MeshAxis::Y, MeshAxis::Z) {
             notes.push(format!("{up} up, facing {facing}"));
         }

@@ -58,6 +58,17 @@ fn proposal(stature: f64, option: &str) -> String {
     }
 }
 
+/// Note on a body that is not in metres.
+pub(super) fn unit_note(stature: f64, unit: f64) -> Option<String> {
+    ((unit - 1.0).abs() > 1e-9).then(|| {
+        format!(
+            "in {}: stature {stature:.1} is {:.2} m",
+            unit_name(unit),
+            stature * unit
+        )
+    })
+}
+
 /// Checks the volume of a body (m³) for its stature (m).
 ///
 /// # Errors
