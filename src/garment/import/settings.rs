@@ -8,8 +8,7 @@ settings! {
         /// Length below which an edge is removed together with its partner in a seam, metres: such edges come from seam
         /// arithmetic and give triangles a tenth as wide as the mesh.
         pub shortest_edge: f64 = 0.009,
-        /// Heights of waist and high point of the shoulder of the figure that patterns are drawn around, metres (GarmentCode's
-        /// mean body, 1.72 m).
+        /// Height of the waist of the figure that patterns are drawn around, metres (GarmentCode's mean body, 1.72 m).
         pub figure_waist: f64 = 1.09,
         /// Height of the high point of its shoulder, metres.
         pub figure_shoulder: f64 = 1.457,
@@ -18,7 +17,7 @@ settings! {
         pub figure_middle: f64 = 0.32,
         /// Height of a panel's top above the waist from which it covers more than waist and hips, metres: waistbands end at it.
         pub above_waist: f64 = 0.06,
-        /// Lowest chest and highest waist of figures from 1.5 to 2 m, metres: in between a panel's top may be either.
+        /// Height of the chest of a figure of 1.5 m, metres: between it and `highest_waist` a panel's top may be either.
         pub lowest_chest: f64 = 1.1,
         /// Height of the waist of a figure of 2 m, metres.
         pub highest_waist: f64 = 1.28,
@@ -26,7 +25,7 @@ settings! {
         pub trunk_width: f64 = 0.12,
         /// Height of a panel's top above the shoulder, or of its foot below, from which it stands on the neckline, metres.
         pub above_shoulder: f64 = 0.018,
-        /// Least distances of a sleeve and of its middle from the sagittal plane, metres.
+        /// Least distance of a sleeve from the sagittal plane, metres.
         pub arm_gap: f64 = 0.08,
         /// Least distance of the middle of a sleeve from the sagittal plane, metres.
         pub arm_middle: f64 = 0.16,

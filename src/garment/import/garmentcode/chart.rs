@@ -2,7 +2,7 @@
 
 use super::super::settings::ImportSettings;
 use super::figure::DrawnPanel;
-use super::region::{CoveredPart, fault};
+use super::region::{CoveredPart, fault, is_sewn_to_other};
 use super::ring::RingPart;
 use super::shoulders::{shoulder_seams, side_seam_tops};
 use crate::{GarmentError, Placement, Side};
@@ -154,10 +154,7 @@ fn sleeve(
             .fold(f64::MAX, f64::min)
     };
     let (start, top) = (least(a), least(b));
-    let is_cuff = !p
-        .neighbours
-        .iter()
-        .any(|n| !matches!(regions[n.panel], CoveredPart::Arm(_)));
+    let is_cuff = !is_sewn_to_other(panels, regions, k);
     Ok(FlatChart {
         placement: Placement::Sleeve(side),
         sector: is_cuff.then_some(if sign > 0.0 { [0.0, PI] } else { [-PI, 0.0] }),
@@ -173,13 +170,7 @@ fn overarm(
     side: Side,
 ) -> Option<(Vector3<f64>, Vector3<f64>)> {
     let arm = CoveredPart::Arm(side);
-    let main = |k: &usize| {
-        let outside = panels[*k]
-            .neighbours
-            .iter()
-            .any(|n| !matches!(regions[n.panel], CoveredPart::Arm(_)));
-        regions[*k] == arm && outside
-    };
+    let main = |k: &usize| regions[*k] == arm && is_sewn_to_other(panels, regions, *k);
     let mut seams: Vec<[Vector3<f64>; 2]> = Vec::new();
     for k in (0..panels.len()).filter(main) {
         let p = &panels[k];
@@ -207,14 +198,8 @@ fn overarm(
 /// Moves cuffs along their limb until they meet the panel that they hang on.
 fn close_gaps(panels: &[DrawnPanel<'_>], regions: &[CoveredPart], charts: &mut [FlatChart]) {
     let is_limb = |k: usize| matches!(regions[k], CoveredPart::Arm(_) | CoveredPart::Leg(_));
-    let is_main = |k: usize| {
-        panels[k]
-            .neighbours
-            .iter()
-            .any(|n| regions[n.panel] != regions[k])
-    };
     let mut done: Vec<bool> = (0..panels.len())
-        .map(|k| !is_limb(k) || is_main(k))
+        .map(|k| !is_limb(k) || is_sewn_to_other(panels, regions, k))
         .collect();
     let height = |charts: &[FlatChart], k: usize, e: usize| {
         let ends = panels[k].raw.edges[e]

@@ -30,35 +30,39 @@ pub(super) fn names(
                     out.insert((k, n.edge), format!("crown_{i}"));
                 }
             }
-            CoveredPart::Leg(side) => {
-                let height = |e: usize| p.middle(e).y;
-                let crotch = p
-                    .neighbours
-                    .iter()
-                    .filter(|n| matches!(regions[n.panel], CoveredPart::Leg(s) if s != side));
-                let Some(crotch) = crotch
-                    .map(|n| n.edge)
-                    .min_by(|a, b| height(*a).total_cmp(&height(*b)))
-                else {
-                    continue;
-                };
-                let inner = p.neighbours.iter().filter(|n| {
-                    regions[n.panel] == regions[k]
-                        && panels[n.panel].is_in_front() != p.is_in_front()
-                        && p.middle(n.edge).x.abs() < p.centre.x.abs()
-                });
-                out.insert((k, crotch), "crotch".to_owned());
-                if let Some(e) = inner
-                    .map(|n| n.edge)
-                    .max_by(|a, b| height(*a).total_cmp(&height(*b)))
-                {
-                    out.insert((k, e), "inseam".to_owned());
-                }
+            CoveredPart::Leg(_) => {
+                let named = leg_edges(panels, regions, k).into_iter().flatten();
+                out.extend(named.map(|(e, name)| ((k, e), name.to_owned())));
             }
             _ => {}
         }
     }
     out
+}
+
+/// Lowest edge towards the other leg, and highest inner one towards the panel behind or before it; none without the former.
+fn leg_edges(
+    panels: &[DrawnPanel<'_>],
+    regions: &[CoveredPart],
+    k: usize,
+) -> [Option<(usize, &'static str)>; 2] {
+    let p = &panels[k];
+    let by_height = |a: &usize, b: &usize| p.middle(*a).y.total_cmp(&p.middle(*b).y);
+    let is_other_leg = |r: CoveredPart| matches!(r, CoveredPart::Leg(_)) && r != regions[k];
+    let crotch = p
+        .neighbours
+        .iter()
+        .filter(|n| is_other_leg(regions[n.panel]));
+    let Some(crotch) = crotch.map(|n| n.edge).min_by(by_height) else {
+        return [None, None];
+    };
+    let inner = p.neighbours.iter().filter(|n| {
+        regions[n.panel] == regions[k]
+            && panels[n.panel].is_in_front() != p.is_in_front()
+            && p.middle(n.edge).x.abs() < p.centre.x.abs()
+    });
+    let inseam = inner.map(|n| n.edge).max_by(by_height);
+    [Some((crotch, "crotch")), inseam.map(|e| (e, "inseam"))]
 }
 
 fn numbered(name: &str, k: usize) -> String {

@@ -51,17 +51,11 @@ pub fn from_garmentcode(
         };
         let names = (0..p.raw.edges.len()).map(|e| (!dropped[k][e]).then(|| name_of(e)));
         let names: Vec<Option<String>> = names.collect();
-        panels.push(convert(p, &charts[k], &names)?);
+        panels.push(convert(p, &charts[k], &names, settings.shortest_edge)?);
         edge_names.push(names);
     }
     let kind = kind(&panels);
-    // A chest is measured where its side seams are closed: deep armholes and slanting rims end lower.
-    let shoulder = chart::shoulder_height(&drawn, &regions, &settings);
-    let closed = shoulders::side_seam_tops(&drawn, &regions).into_iter();
-    let [chest, waist, hip] = settings.girth_levels;
-    let levels = closed.fold([chest, waist, hip], |l, y| {
-        [l[0].min(y - shoulder - UNDER_SEAM), l[1], l[2]]
-    });
+    let levels = girth_levels(&drawn, &regions, &settings);
     let pattern = Pattern {
         name: name.to_owned(),
         kind,
@@ -76,6 +70,20 @@ pub fn from_garmentcode(
     };
     pattern.check()?;
     Ok(pattern)
+}
+
+/// Levels of the girths (metres from the shoulder and from the waist). A chest is measured where its side seams are closed: deep
+/// armholes and slanting rims end lower.
+fn girth_levels(
+    drawn: &[DrawnPanel<'_>],
+    regions: &[CoveredPart],
+    settings: &ImportSettings,
+) -> [f64; 3] {
+    let shoulder = chart::shoulder_height(drawn, regions, settings);
+    let closed = shoulders::side_seam_tops(drawn, regions).into_iter();
+    let [chest, waist, hip] = settings.girth_levels;
+    let below = closed.map(|y| y - shoulder - UNDER_SEAM);
+    [below.fold(chest, f64::min), waist, hip]
 }
 
 fn seams(raw: &RawPattern, panels: &[Panel], names: &EdgeNames) -> Vec<Seam> {
@@ -177,11 +185,12 @@ fn area(p: &DrawnPanel<'_>, chart: &FlatChart) -> f64 {
     0.5 * double
 }
 
-/// Converts a panel; its outline ends counter-clockwise.
+/// Converts a panel; its outline ends counter-clockwise. Edges without a name are those shorter than `shortest` metres.
 fn convert(
     p: &DrawnPanel<'_>,
     chart: &FlatChart,
     names: &[Option<String>],
+    shortest: f64,
 ) -> Result<Panel, GarmentError> {
     let to = |q: [f64; 2]| chart.point(p, q);
     let mut edges = Vec::new();
@@ -197,7 +206,11 @@ fn convert(
     if edges.len() < 3 {
         return Err(GarmentError::Panel {
             panel: p.raw.name.clone(),
-            why: "fewer than three edges longer than 9 mm".into(),
+            why: format!(
+                "{} edges, expected at least three longer than {:.0} mm or sewn to such a one",
+                edges.len(),
+                1e3 * shortest
+            ),
         });
     }
     let mut panel = Panel {

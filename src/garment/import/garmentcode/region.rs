@@ -170,7 +170,7 @@ fn is_leg(panels: &[DrawnPanel<'_>], k: usize, settings: &ImportSettings) -> boo
     outside.contains(&true) && outside.contains(&false)
 }
 
-/// Refuses a panel that lies neither before nor behind the body, unless its name says it.
+/// Refuses a panel that lies neither before nor behind the body.
 fn check(
     p: &DrawnPanel<'_>,
     r: CoveredPart,
@@ -190,6 +190,16 @@ fn check(
         return Err(fault(p, why));
     }
     Ok(())
+}
+
+/// True for a panel that is sewn to one of another region: it starts its limb, in contrast to cuffs.
+pub(super) fn is_sewn_to_other(
+    panels: &[DrawnPanel<'_>],
+    regions: &[CoveredPart],
+    k: usize,
+) -> bool {
+    let mut neighbours = panels[k].neighbours.iter();
+    neighbours.any(|n| regions[n.panel] != regions[k])
 }
 
 /// A panel's fault, with its place.

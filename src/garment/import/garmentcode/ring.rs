@@ -6,6 +6,9 @@ use super::region::{CoveredPart, fault};
 use crate::GarmentError;
 use std::f64::consts::{PI, TAU};
 
+/// Distance between two sewn edges of a panel over its width from which they are its two sides; those of a dart are nearer.
+const ACROSS: f64 = 0.8;
+
 /// A panel's part of a ring.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct RingPart {
@@ -68,7 +71,7 @@ fn is_tube(panels: &[DrawnPanel<'_>], k: usize) -> bool {
     let width = p.x[1] - p.x[0];
     let own = p.neighbours.iter().filter(|n| n.panel == k);
     own.map(|n| (p.middle(n.edge) - p.middle(n.other)).norm())
-        .any(|apart| apart > 0.8 * width)
+        .any(|apart| apart > ACROSS * width)
 }
 
 /// Shares the turn among the panels of a ring by the lengths of their upper sides.

@@ -20,6 +20,8 @@ const FOLD: f64 = -0.5;
 /// Least share of the whole area of a sheet.
 const LEAST_SHEET: f64 = 0.05;
 
+/// Faces of the smallest closed surface, which has no inner sheet.
+const TETRAHEDRON: usize = 4;
 /// Faces of a part that are tested first: most closed parts are no double layers.
 const SAMPLE: usize = 256;
 /// Share of the sample with a face behind, over the share that a double layer needs, below which the part is none.
@@ -134,7 +136,7 @@ fn closed_components(neighbours: &[[Option<u32>; 3]]) -> Vec<Vec<u32>> {
         let is_closed = component
             .iter()
             .all(|f| neighbours[*f as usize].iter().all(Option::is_some));
-        if is_closed && component.len() > 4 {
+        if is_closed && component.len() > TETRAHEDRON {
             out.push(component);
         }
     }
