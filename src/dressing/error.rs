@@ -62,11 +62,11 @@ pub enum MeshGarmentError {
     },
     /// Cloth that lies beside the body.
     #[error(
-        "its cloth goes {most} % of the way around a part of the body; {least} % are worn: --unit, --up and --facing say how \
-         the file was made, --garment-body on whom"
+        "it is not worn like a garment: its cloth goes {most} % of the way around the body where it lies, expected {least} %: \
+         --unit, --up and --facing say how the file was made, --garment-body on whom"
     )]
     NotWorn {
-        /// Largest share of the way, percent.
+        /// Mean share of the way of the piece that goes farthest, percent.
         most: u32,
         /// Least share of cloth that is worn, percent.
         least: u32,

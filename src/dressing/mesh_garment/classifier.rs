@@ -1,16 +1,18 @@
 //! Classification of a piece of a mesh garment by the skin it lies over.
 
-use super::wrap::wrap;
+use super::file_part::{FilePart, PartRole};
+use super::wrap::{ClothOverSkin, wrap};
 use crate::file_frame::bounds;
 use crate::settings::ClassifierSettings;
 use tryon_body::parts::vertex_masks;
-use tryon_body::{SkinBinding, Template};
+use tryon_body::{SkinBinding, SkinSearch, Template};
 use tryon_formats::sewn_obj::SewnObj;
 use tryon_garment::{GarmentKind, Region};
-use tryon_geometry::math::P3;
-use tryon_geometry::mesh::Topology;
-use tryon_geometry::spatial::PointTree;
+use tryon_geometry::math::{P3, V3};
+use tryon_geometry::mesh::{Face, Topology};
 
+/// Words of a fastening's name.
+const FASTENINGS: [&str; 5] = ["button", "buckle", "zip", "rivet", "eyelet"];
 /// Both legs.
 pub(super) const LEGS: Region = Region::LEFT_LEG.with(Region::RIGHT_LEG);
 
@@ -33,7 +35,7 @@ pub(super) struct PieceShape {
     pub(super) openings: Vec<Vec<u32>>,
     /// It ends in a leg on either side.
     pub(super) has_legs: bool,
-    /// Largest share of the way that it goes around a part of the body.
+    /// Mean share of the way that it goes around the body.
     pub(super) wrap: f64,
 }
 
@@ -42,7 +44,7 @@ pub(super) struct PieceClassifier<'a> {
     pub(super) template: &'a Template,
     settings: &'a ClassifierSettings,
     parts: Vec<u8>,
-    tree: PointTree,
+    skin: SkinSearch<'a>,
     /// Per body vertex: it belongs to the head, a hand or a foot.
     is_end: Vec<bool>,
     /// Heights, metres.
@@ -58,7 +60,7 @@ impl<'a> PieceClassifier<'a> {
         let height = |n: &str| sk.index(n).map(|j| sk.joints()[j].rest.y as f32);
         Self {
             parts: vertex_masks(template),
-            tree: PointTree::new(body),
+            skin: SkinSearch::new(template, body, 0.0),
             is_end: (0..body.len()).map(|i| segment(i).is_extremity()).collect(),
             shoulder: height("left_shoulder")
                 .or_else(|| height("neck"))
@@ -68,25 +70,36 @@ impl<'a> PieceClassifier<'a> {
             settings,
         }
     }
-    /// Cloth, in contrast to an accessory that keeps its shape: hats, shoes, buttons. Socks count as shoes.
-    pub(super) fn is_cloth(&self, piece: &SewnObj) -> bool {
+    /// Role of a part by its size and the skin below; a name helps to know larger fastenings. Socks count as shoes.
+    pub(super) fn role(&self, piece: &SewnObj) -> PartRole {
         let Some((lo, hi)) = piece.obj.mesh.bounds() else {
-            return false;
+            return PartRole::Fastening;
         };
+        let is_named = FilePart::new(0, piece).is_named(&FASTENINGS);
+        let smallest = match is_named {
+            true => self.settings.smallest_named,
+            false => self.settings.smallest,
+        };
+        if (hi - lo).amax() <= smallest {
+            return PartRole::Fastening;
+        }
         let v = piece.obj.mesh.vertices();
-        let nearest = |p| self.tree.nearest(p, self.settings.search);
+        let nearest = |p| self.skin.nearest(p, &V3::zeros(), self.settings.search);
         let over_ends = v
             .iter()
             .filter(|p| nearest(p).is_some_and(|(i, _)| self.is_end[i]))
             .count();
-        (hi - lo).amax() > self.settings.smallest
-            && hi.y > self.knee
-            && (over_ends as f64) < self.settings.accessory * v.len() as f64
+        match hi.y > self.knee && (over_ends as f64) < self.settings.accessory * v.len() as f64 {
+            true => PartRole::Cloth,
+            false => PartRole::Accessory,
+        }
     }
+
     /// Classifies a piece of cloth with vertices `x` (m) bound to the body.
     pub(super) fn classify(
         &self,
         topology: &Topology,
+        faces: &[Face],
         x: &[P3],
         binding: &SkinBinding,
     ) -> PieceShape {
@@ -122,8 +135,17 @@ impl<'a> PieceClassifier<'a> {
             Support::Opening if over_legs > settings.over_legs[1] => GarmentKind::Skirt,
             _ => GarmentKind::Top,
         };
+        let height: Vec<f32> = (0..x.len())
+            .map(|i| self.skin.height(&x[i], below(i)))
+            .collect();
+        let over_skin = ClothOverSkin {
+            faces,
+            x,
+            over: &parts,
+            height: &height,
+        };
         PieceShape {
-            wrap: wrap(self.template, &self.parts, x, &parts),
+            wrap: wrap(self.template, &self.parts, &over_skin),
             kind,
             support,
             parts,

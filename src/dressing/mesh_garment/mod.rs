@@ -3,8 +3,10 @@
 mod anchors;
 mod avatar;
 pub(crate) mod classifier;
+mod file_part;
 pub(crate) mod grading;
 mod layers;
+mod linings;
 mod painting;
 mod piece;
 mod read;

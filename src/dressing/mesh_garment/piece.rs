@@ -2,6 +2,7 @@
 
 use super::anchors::anchors;
 use super::classifier::{LEGS, PieceClassifier, PieceShape, Support};
+use super::file_part::FilePart;
 use super::grading::{Grading, LimbShares};
 use super::skin_lift::lifted;
 use super::surface::{follow_both_legs, orient_outwards, unroll};
@@ -28,8 +29,10 @@ pub(super) struct GarmentPiece {
     pub(super) positions: Vec<P3>,
     pub(super) binding: SkinBinding,
     rest: RestShape,
-    /// Largest share of the way that it goes around a part of the source body.
+    /// Mean share of the way that it goes around the source body.
     pub(super) wrap: f64,
+    /// Part of the file that it comes from.
+    pub(super) part: FilePart,
 }
 
 /// Origin of a piece's rest shape on another body.
@@ -52,8 +55,13 @@ pub(super) struct PieceBuilder<'a> {
 }
 
 impl PieceBuilder<'_> {
-    /// A sheet of cloth, and a note about it.
-    pub(super) fn cloth(&self, sewn: SewnObj) -> Result<(GarmentPiece, String), GarmentError> {
+    /// A sheet of cloth, the `number`th, and a note about it.
+    pub(super) fn cloth(
+        &self,
+        number: usize,
+        sewn: SewnObj,
+    ) -> Result<(GarmentPiece, String), GarmentError> {
+        let part = FilePart::new(number, &sewn);
         let (sewn, settings) = (self.remeshed(sewn), self.settings);
         let made = from_mesh(&sewn, self.name, GarmentKind::Top, self.material.clone())?;
         let (mut garment, mut x) = (made.garment, made.positions);
@@ -79,7 +87,9 @@ impl PieceBuilder<'_> {
                 *rest = widened(*rest, settings.piece.least_height);
             }
         }
-        let shape = self.classifier.classify(&topology, &x, &binding);
+        let shape = self
+            .classifier
+            .classify(&topology, &garment.faces, &x, &binding);
         if !shape.has_legs {
             follow_both_legs(template, &x, &mut binding, &settings.surface);
         }
@@ -87,7 +97,7 @@ impl PieceBuilder<'_> {
         garment.regions = regions(&shape, &topology, &x, settings.piece.middle);
         garment.anchors = anchors(template, &shape, &x, &settings.anchors);
         let note = format!(
-            "{}, {} vertices, {}{more}",
+            "{part}: {}, {} vertices, {}{more}",
             kind_name(shape.kind),
             garment.vertices,
             if made.flat {
@@ -101,6 +111,7 @@ impl PieceBuilder<'_> {
             positions: x,
             binding,
             wrap: shape.wrap,
+            part,
             rest: if made.flat {
                 RestShape::Scaled
             } else {
@@ -138,6 +149,7 @@ impl PieceBuilder<'_> {
             positions,
             rest: RestShape::Fitted,
             wrap: 0.0,
+            part: FilePart::default(),
         }))
     }
     /// A mesh without flat panels gets even triangles.
@@ -188,7 +200,6 @@ fn regions(shape: &PieceShape, topology: &Topology, x: &[P3], middle: f32) -> Ve
         .collect()
 }
 
-/// Several pieces as one.
 /// One surface of some; without their stitches if there are several.
 pub(super) fn merge(pieces: &[SewnObj]) -> Option<SewnObj> {
     let mut out = pieces.first()?.clone();
@@ -297,85 +308,4 @@ fn take_rest(x: &[P3], garment: &mut GarmentMesh, collapsed: f64) {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::super::layers::by_layer;
-    use super::*;
-    use std::f32::consts::TAU;
-    use tryon_body::embedded;
-
-    /// An upright open tube around (0, 0) in the file's own coordinates.
-    fn tube(radius: f32, y: std::ops::Range<f32>) -> SewnObj {
-        let (n, rows) = (48u32, 16u32);
-        let vertices = (0..n * rows).map(|k| {
-            let (a, t) = (TAU * (k % n) as f32 / n as f32, (k / n) as f32);
-            let y = y.start + (y.end - y.start) * t / (rows - 1) as f32;
-            P3::new(radius * a.sin(), y, radius * a.cos())
-        });
-        let faces = (0..n * (rows - 1)).flat_map(|k| {
-            let (i, j) = (k % n, k / n);
-            let at = |i: u32, j: u32| j * n + i % n;
-            [
-                [at(i, j), at(i + 1, j), at(i + 1, j + 1)],
-                [at(i, j), at(i + 1, j + 1), at(i, j + 1)],
-            ]
-        });
-        let mesh = TriMesh::new(vertices.collect(), faces.collect()).expect("a tube");
-        SewnObj {
-            obj: ObjMesh::from(mesh),
-            stitches: Vec::new(),
-        }
-    }
-
-    fn with_builder(test: impl Fn(&PieceBuilder<'_>)) {
-        let template = embedded::template();
-        let settings = MeshGarmentSettings::with_edge(0.03);
-        test(&PieceBuilder {
-            classifier: &PieceClassifier::new(&template, &settings.classifier),
-            name: "piece",
-            material: &Material::preset("cotton").expect("preset"),
-            settings: &settings,
-        });
-    }
-
-    #[test]
-    fn a_tube_around_both_legs_is_a_skirt_held_at_its_upper_opening() {
-        with_builder(|b| {
-            let (piece, note) = b.cloth(tube(0.26, 0.45..1.0)).expect("cloth");
-            let g = &piece.garment;
-            assert_eq!(g.kind, GarmentKind::Skirt, "{note}");
-            assert_eq!(g.anchors.len(), 1);
-            assert_eq!(g.anchors[0].kind, AnchorKind::Band);
-            let lowest = g.anchors[0].vertices.iter();
-            let lowest = lowest
-                .map(|v| piece.positions[*v as usize].y)
-                .fold(9.0, f32::min);
-            assert!(lowest > 0.95, "{lowest}");
-            // Every vertex may touch both legs, and no arm.
-            let all = Region::TRUNK.with(LEGS);
-            assert!(g.regions.iter().filter(|r| **r == all).count() * 10 > 8 * g.vertices);
-        });
-    }
-
-    #[test]
-    fn buttons_and_hats_are_no_cloth_and_become_one_rigid_piece() {
-        with_builder(|b| {
-            let (button, hat) = (tube(0.02, 1.2..1.22), tube(0.12, 1.62..1.8));
-            assert!(!b.classifier.is_cloth(&button) && !b.classifier.is_cloth(&hat));
-            assert!(b.classifier.is_cloth(&tube(0.26, 0.45..1.0)));
-            let rigid = b.rigid(&[button, hat]).expect("a mesh").expect("an area");
-            assert!(rigid.is_rigid() && rigid.garment.vertices == 2 * 48 * 16);
-            assert!(b.rigid(&[]).expect("nothing").is_none());
-        });
-    }
-
-    #[test]
-    fn layers_are_ordered_from_the_skin_outwards() {
-        with_builder(|b| {
-            let piece = |r| b.cloth(tube(r, 0.5..1.0)).expect("cloth").0;
-            let radius = |p: &GarmentPiece| p.positions[0].x.hypot(p.positions[0].z);
-            let sorted = by_layer(vec![piece(0.34), piece(0.24), piece(0.29)]);
-            let radii: Vec<f32> = sorted.iter().map(radius).collect();
-            assert!(radii.windows(2).all(|w| w[0] < w[1]), "{radii:?}");
-        });
-    }
-}
+mod tests;

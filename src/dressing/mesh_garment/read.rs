@@ -2,7 +2,9 @@
 
 use super::avatar::DressedAvatar;
 use super::classifier::PieceClassifier;
+use super::file_part::{PartRole, carried};
 use super::layers::by_layer;
+use super::linings::linings;
 use super::piece::{GarmentPiece, PieceBuilder};
 use super::sizing::{Sizing, SourceCloth};
 use super::skin_lift::lifted;
@@ -297,7 +299,7 @@ fn in_metres(mut sewn: SewnObj, source: &SourceBody) -> Result<SewnObj, GarmentE
     Ok(sewn)
 }
 
-/// Checks that one sheet of cloth at the least goes around a part of the body.
+/// Checks that one sheet of cloth at the least goes around the body.
 fn check_worn(cloth: &[GarmentPiece], least: f64) -> Result<(), MeshGarmentError> {
     let most = cloth.iter().map(|p| p.wrap).fold(0.0, f64::max);
     if cloth.is_empty() || most >= least {
@@ -315,30 +317,38 @@ fn build(
     sewn: &SewnObj,
     notes: &mut Vec<String>,
 ) -> Result<Vec<GarmentPiece>, MeshGarmentError> {
-    let (cloth, rigid): (Vec<SewnObj>, Vec<SewnObj>) = split(sewn)
-        .into_iter()
-        .partition(|p| builder.classifier.is_cloth(p));
+    let (mut cloth, mut fastenings, mut accessories) = (Vec::new(), Vec::new(), Vec::new());
+    for part in split(sewn) {
+        match builder.classifier.role(&part) {
+            PartRole::Cloth => cloth.push(part),
+            PartRole::Fastening => fastenings.push(part),
+            PartRole::Accessory => accessories.push(part),
+        }
+    }
     let mut pieces = Vec::new();
     for (piece, s) in cloth.into_iter().enumerate() {
         let (p, note) = builder
-            .cloth(s)
+            .cloth(piece, s)
             .map_err(|why| MeshGarmentError::Piece { piece, why })?;
-        notes.push(format!("piece {piece}: {note}"));
+        notes.push(note);
         pieces.push(p);
     }
     check_worn(&pieces, builder.settings.classifier.wrap)?;
     let piece = pieces.len();
     pieces = by_layer(pieces);
+    let lined = linings(&pieces, &builder.settings.lining);
+    let lined = lined.iter().zip(&pieces);
+    notes.extend(lined.filter_map(|(outer, lining)| {
+        let outer = &pieces[(*outer)?];
+        Some(format!("{} is the lining of {}", lining.part, outer.part))
+    }));
+    notes.extend(carried(&fastenings, "fastening", "fastenings"));
+    notes.extend(carried(&accessories, "accessory", "accessories"));
+    let rigid: Vec<SewnObj> = fastenings.into_iter().chain(accessories).collect();
     let made = builder
         .rigid(&rigid)
         .map_err(|why| MeshGarmentError::Piece { piece, why })?;
     if let Some(p) = made {
-        notes.push(format!(
-            "{} {} of {} vertices carried by the skin: no cloth that falls",
-            rigid.len(),
-            if rigid.len() == 1 { "part" } else { "parts" },
-            p.garment.vertices
-        ));
         pieces.insert(0, p);
     }
     for (layer, p) in pieces.iter_mut().enumerate() {

@@ -10,7 +10,7 @@ pub use drape::OutfitDrapeSettings;
 pub use fit::{FitMapSettings, WornSizeSettings};
 pub use mesh_garment::{
     AnchorSettings, AvatarSettings, ClassifierSettings, GarmentSurfaceSettings, GuessSettings,
-    LiftSettings, MeshGarmentSettings, PieceSettings, RetargetSettings,
+    LiftSettings, LiningSettings, MeshGarmentSettings, PieceSettings, RetargetSettings,
 };
 pub use place::{
     HoodPlaceSettings, LegPlaceSettings, PlaceSettings, SkirtPlaceSettings, SleevePlaceSettings,

@@ -8,7 +8,7 @@ use tryon::dressing::{
     DressOptions, GarmentFile, MeshGarment, MeshGarmentError, MeshGarmentSettings, dress,
 };
 use tryon::formats::mesh_frame::upright_rotation;
-use tryon::formats::{MeshAxis, MeshFrame};
+use tryon::formats::{MeshAxis, MeshFrame, shared_data};
 use tryon::garment::{Material, Size, library};
 use tryon::geometry::math::{Body, P3, Rigid, V3, World};
 use tryon::geometry::mesh::{Face, Topology, TriMesh, face_normal};
@@ -70,20 +70,39 @@ impl Export {
                 .collect(),
         }
     }
+    /// A button: a tetrahedron of 1 cm.
+    fn button(at: P3) -> Self {
+        let corners = [
+            [0.0, 0.0, 0.0],
+            [0.01, 0.0, 0.0],
+            [0.0, 0.01, 0.0],
+            [0.0, 0.0, 0.005],
+        ];
+        Self {
+            vertices: corners.map(|c| at + V3::from(c)).to_vec(),
+            faces: vec![[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]],
+        }
+    }
+    /// The same surface, moved along its normals [m].
+    fn offset(&self, distance: f32) -> Self {
+        let mut normals = vec![V3::zeros(); self.vertices.len()];
+        for f in &self.faces {
+            let normal = face_normal(&self.vertices, f);
+            f.iter().for_each(|v| normals[*v as usize] += normal);
+        }
+        let moved = self.vertices.iter().zip(&normals);
+        Self {
+            vertices: moved.map(|(p, n)| p + n.normalize() * distance).collect(),
+            faces: self.faces.clone(),
+        }
+    }
     /// Cloth with a thickness [m]: an inner sheet, joined at the rims.
     fn thick(&self, thickness: f32) -> Self {
         let mesh = TriMesh::new(self.vertices.clone(), self.faces.clone()).expect("a surface");
         let topology = Topology::new(&mesh).expect("a sheet");
         let n = self.vertices.len() as u32;
-        let mut normals = vec![V3::zeros(); n as usize];
-        for f in &self.faces {
-            let normal = face_normal(&self.vertices, f);
-            f.iter().for_each(|v| normals[*v as usize] += normal);
-        }
-        let inner = self.vertices.iter().zip(&normals);
         let mut out = self.clone();
-        out.vertices
-            .extend(inner.map(|(p, n)| p - n.normalize() * thickness));
+        out.vertices.extend(self.offset(-thickness).vertices);
         out.faces
             .extend(self.faces.iter().map(|[a, b, c]| [a + n, c + n, b + n]));
         for [a, b] in topology
@@ -206,6 +225,46 @@ fn a_rag_is_no_garment() {
     };
     let e = read(&rag.save(folder.path(), "rag"), MeshFrame::default()).expect_err("no garment");
     assert!(e.to_string().contains("--unit"), "{e}");
+}
+
+/// Surfaces that a body fits near, but that go around nothing.
+#[test]
+fn squares_and_triangles_are_no_garments() {
+    let toys = [
+        "obj_nonmanifold/three_faces.obj",
+        "gltf_quantised/u16.glb",
+        "gltf_triangle_strip/quad_and_strip.glb",
+    ];
+    for toy in toys {
+        let Some(path) = shared_data(Path::new("reports").join(toy)) else {
+            return;
+        };
+        let e = read(&path, MeshFrame::default()).expect_err("no garment");
+        assert!(
+            e.to_string().contains("not worn like a garment"),
+            "{toy}: {e}"
+        );
+    }
+}
+
+/// Buttons and a lining beside the shirt are told from it by where they lie.
+#[test]
+fn buttons_and_linings_are_said() {
+    let folder = tempfile::tempdir().expect("temporary folder");
+    let [shirt, _] = Export::shirt_and_person();
+    let mut file = shirt.beside(&shirt.offset(-0.004));
+    for height in [1.1f32, 1.2] {
+        let front = shirt
+            .vertices
+            .iter()
+            .filter(|p| (p.y - height).abs() < 0.02);
+        let front = front.fold(0.0f32, |z, p| z.max(p.z));
+        file = file.beside(&Export::button(P3::new(0.0, height, front + 0.004)));
+    }
+    let garment = read(&file.save(folder.path(), "jacket"), MeshFrame::default()).expect("worn");
+    let notes = garment.notes.join("; ");
+    assert!(notes.contains("is the lining of piece"), "{notes}");
+    assert!(notes.contains("2 fastenings"), "{notes}");
 }
 
 /// Stated axes win over what lies better.
