@@ -1,0 +1,1 @@
+"""Converter of the colour model: TFLite files of the npm package to one ONNX file."""
