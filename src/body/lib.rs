@@ -13,6 +13,7 @@
 //! - The embedded figure: [`mod@embedded`], read by [`mod@template_file`].
 //! - Tape measures: [`mod@measure::tape`].
 //! - Arms turned out of the trunk, for the easy pose of the first drape: [`mod@arm_clearance`].
+//! - Yaw about gravity from shoulders and hips: [`mod@trunk_yaw`].
 //! - Points bound to the skin: [`mod@skin_binding`].
 //! - A skeleton for a bare scan: [`mod@rig`], `src/dressing/rig_standing.rs`.
 //!
@@ -47,6 +48,7 @@ mod skin_weights;
 mod skinning;
 mod template;
 mod template_file;
+mod trunk_yaw;
 
 pub use arm_clearance::ArmClearance;
 pub use error::BodyError;
@@ -61,3 +63,4 @@ pub use skin_binding::{PosedSkin, SkinBinding, SkinSearch};
 pub use skin_weights::SkinWeights;
 pub use skinning::{MovedRest, skin, skin_moved};
 pub use template::Template;
+pub use trunk_yaw::{TrunkSides, level_axes};

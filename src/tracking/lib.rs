@@ -87,7 +87,7 @@ pub use model::{PartClasses, TrackerModel, part_classes};
 pub use report::{Skipped, StepError, StepReport, TrackingStagesMs};
 pub use settings::TrackerConfig;
 pub use shape::{KnownBody, ShapeFault, SizeEstimate, SurfaceStatistics};
-pub use start::{Facing, JointProposals, ProposedAnchor, facing, yaw_of_joints, yaw_of_trunk};
+pub use start::{Facing, JointProposals, ProposedAnchor, facing, yaw_of_joints};
 pub use state::TrackerState;
 pub use status::{LostReason, Status};
 pub use step::{follow, step};

@@ -4,10 +4,8 @@ use crate::model::{PartClasses, PartKind};
 use crate::segment::part_forest::{PersonCells, YAW_BINS, YawBelief};
 use std::f32::consts::{FRAC_PI_4, TAU};
 use tryon_body::parts::BodySide;
-use tryon_geometry::math::{P3d, V3, V3d};
-
-/// Least length of the level part of a unit direction from which it gives a yaw.
-const LEVEL: f64 = 0.05;
+use tryon_body::{TrunkSides, level_axes};
+use tryon_geometry::math::{P3d, V3};
 
 /// Direction in which the person faces.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -20,13 +18,6 @@ pub struct Facing {
     pub belief: [f32; YAW_BINS],
     /// Belief within a quarter turn of `yaw` less the belief beyond, 0 to 1.
     pub confidence: f32,
-}
-
-/// Level directions at a place: towards the camera, and to its left hand of the subject who faces it.
-fn level_axes(place: &V3d, up: &V3d) -> Option<[V3d; 2]> {
-    let level = -(place - up * up.dot(place));
-    let to_camera = level.try_normalize(LEVEL * place.norm())?;
-    Some([to_camera, up.cross(&to_camera)])
 }
 
 /// Facing of a person whose yaw the part forest has voted on. `None` without a vote or under a camera straight above.
@@ -75,41 +66,9 @@ pub fn yaw_of_joints(classes: &PartClasses, joints: &[P3d], up: &V3) -> Option<f
         let at = |side| classes.anchor_of(kind.class(side), joints);
         Some([at(BodySide::Left)?, at(BodySide::Right)?])
     };
-    yaw_of_trunk(pair(PartKind::Shoulder)?, pair(PartKind::Hip)?, up)
-}
-
-/// Yaw of a trunk from its shoulders and hips, left and right, camera frame, metres.
-pub fn yaw_of_trunk(shoulders: [P3d; 2], hips: [P3d; 2], up: &V3) -> Option<f64> {
-    let up = up.cast::<f64>();
-    let across = (shoulders[0] - shoulders[1]) + (hips[0] - hips[1]);
-    let level = (across - up * up.dot(&across)).try_normalize(LEVEL)?;
-    let middle = nalgebra::center(&hips[0], &hips[1]);
-    let [to_camera, side] = level_axes(&middle.coords, &up)?;
-    let front = level.cross(&up);
-    Some(front.dot(&side).atan2(front.dot(&to_camera)))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use std::f64::consts::{FRAC_PI_2, PI};
-
-    #[test]
-    fn yaw_of_known_trunks() {
-        let up = V3::new(0.0, -1.0, 0.0);
-        // A subject 2 m away who faces the camera has the left side at the image's right.
-        let trunk = |left: V3d| {
-            let at = |k: f64, y: f64| P3d::new(0.0, y, 2.0) + left * k;
-            yaw_of_trunk(
-                [at(0.2, -0.4), at(-0.2, -0.4)],
-                [at(0.1, 0.0), at(-0.1, 0.0)],
-                &up,
-            )
-        };
-        assert!(trunk(V3d::x()).is_some_and(|y| y.abs() < 1e-12));
-        assert!(trunk(-V3d::x()).is_some_and(|y| (y.abs() - PI).abs() < 1e-12));
-        // Turned to the subject's left: the front points to the image's right.
-        assert!(trunk(V3d::z()).is_some_and(|y| (y - FRAC_PI_2).abs() < 1e-12));
-        assert_eq!(trunk(V3d::y()), None);
-    }
+    let sides = TrunkSides {
+        shoulders: Some(pair(PartKind::Shoulder)?),
+        hips: Some(pair(PartKind::Hip)?),
+    };
+    sides.yaw(up)
 }

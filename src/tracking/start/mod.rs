@@ -9,7 +9,7 @@ pub(crate) mod joint_proposals;
 pub(crate) mod proposed_pose;
 
 pub(crate) use body_proposals::{BodyProposals, person_cells};
-pub use facing::{Facing, facing, yaw_of_joints, yaw_of_trunk};
+pub use facing::{Facing, facing, yaw_of_joints};
 pub(crate) use gravity::rolled_camera;
 pub(crate) use hypotheses::resting_limb;
 pub(crate) use initial_pose::{Outline, StartPrior, initial_pose, outline};
