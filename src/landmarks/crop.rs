@@ -29,7 +29,9 @@ pub(crate) fn crop(image: &ColorImage, region: &PersonRegion, form: &CropForm, o
     out.clear();
     out.resize(3 * n * n, 0.0);
     let scale = (form.range[1] - form.range[0]) / 255.0;
-    let share = |k: usize| (k as f32 + 0.5) / n as f32 - 0.5;
+    let corner = region.pixel([0.5 / n as f32 - 0.5; 2]);
+    let [across, down] = [[1.0, 0.0], [0.0, 1.0]]
+        .map(|axis| region.direction(axis).map(|c| c * region.side / n as f32));
     let (red, others) = out.split_at_mut(n * n);
     let (green, blue) = others.split_at_mut(n * n);
     for (row, ((red, green), blue)) in (red.chunks_mut(n))
@@ -38,7 +40,7 @@ pub(crate) fn crop(image: &ColorImage, region: &PersonRegion, form: &CropForm, o
         .enumerate()
     {
         for (column, ((red, green), blue)) in red.iter_mut().zip(green).zip(blue).enumerate() {
-            let at = region.pixel([share(column), share(row)]);
+            let at = [0, 1].map(|c| corner[c] + across[c] * column as f32 + down[c] * row as f32);
             let color = sample(image, at, form.border).map(|c| form.range[0] + scale * c);
             [*red, *green, *blue] = color;
         }

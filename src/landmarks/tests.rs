@@ -195,6 +195,14 @@ fn people_are_found_at_any_roll() {
     }
 }
 
+/// Colour waits on another thread than frames.
+#[test]
+fn a_landmarker_moves_between_threads() {
+    fn assert_send<T: Send>() {}
+    assert_send::<Landmarker>();
+    assert_send::<LandmarkLifter>();
+}
+
 #[test]
 fn a_frame_gives_the_same_bits_again() {
     let (Some(mut first), Some(mut second)) = (landmarker(), landmarker()) else {

@@ -36,8 +36,10 @@ class _Conversion:
     def __init__(self, out: OnnxGraph, prefix: str, source: TfliteGraph):
         self.out, self.prefix, self.source = out, prefix, source
         self.names: dict[int, str] = {}
-        # Padded tensors that were not computed: the tensor before, rows and columns of padding.
+        # Padded tensors that are not computed: the tensor before, rows and columns of padding.
         self.padded: dict[int, tuple[int, list[int]]] = {}
+        # Enlarged tensors that are not computed: the tensor before, rows and columns.
+        self.enlarged: dict[int, tuple[int, list[int]]] = {}
 
     def run(self, outputs: dict[str, int]):
         [image] = self.source.inputs
@@ -74,9 +76,12 @@ class _Conversion:
         size, strides = weights.shape[2:], [options.StrideH(), options.StrideW()]
         dilations = [options.DilationHFactor(), options.DilationWFactor()]
         source, pads = self._window(operator, options, size, strides)
+        source, enlarged = self.enlarged.get(source, (source, None))
+        if enlarged and (size != (1, 1) or strides != [1, 1]):
+            raise SystemExit(f"{self.prefix}: only convolutions of single pixels of an enlarged tensor are converted")
         inputs = [self.names[source], self._weight(operator, 1, weights)]
         inputs.append(self._weight(operator, 2, self.source.constant(operator.inputs[2])))
-        self._activated(operator, options, "Conv", inputs, kernel_shape=size, strides=strides, pads=pads,
+        self._activated(operator, options, "Conv", inputs, enlarged, kernel_shape=size, strides=strides, pads=pads,
                         dilations=dilations, group=groups)
 
     def _max_pool_2d(self, operator: Operator):
@@ -103,10 +108,8 @@ class _Conversion:
         options = operator.options(tflite.ResizeBilinearOptions)
         if options.AlignCorners() or not options.HalfPixelCenters():
             raise SystemExit(f"{self.prefix}: only resizing by half pixel centres is converted")
-        sizes = np.array(_channels_first(self.source.shape(operator.outputs[0])), np.int64)
-        inputs = [self.names[operator.inputs[0]], "", "", self._weight(operator, 1, sizes)]
-        self._node("Resize", inputs, self._name(operator), mode="linear",
-                   coordinate_transformation_mode="half_pixel")
+        [enlarged] = operator.outputs
+        self.enlarged[enlarged] = (operator.inputs[0], self.source.shape(enlarged)[1:3])
 
     def _reshape(self, operator: Operator):
         source, name = operator.inputs[0], self._name(operator)
@@ -134,18 +137,24 @@ class _Conversion:
         same = [t // 2 for t in totals] + [t - t // 2 for t in totals]
         return before, [a + b for a, b in zip(explicit, same)]
 
-    def _activated(self, operator: Operator, options, kind: str, inputs: list[str], **attributes):
+    def _activated(self, operator: Operator, options, kind: str, inputs: list[str], enlarged=None, **attributes):
+        """Node with its activation. A mean of pixels may come after a weighted sum of channels: that enlarges fewer."""
         activation, name = options.FusedActivationFunction(), self._name(operator)
-        if activation == tflite.ActivationFunctionType.NONE:
-            return self._node(kind, inputs, name, **attributes)
-        before = f"{name}.linear"
-        self._node(kind, inputs, before, **attributes)
+        is_linear = activation == tflite.ActivationFunctionType.NONE
+        linear = name if is_linear else f"{name}.linear"
+        small = f"{name}.small" if enlarged else linear
+        self._node(kind, inputs, small, **attributes)
+        if enlarged:
+            sizes = np.array([1, self.source.shape(operator.outputs[0])[3], *enlarged], np.int64)
+            self._node("Resize", [small, "", "", self._weight(operator, 3, sizes)], linear, mode="linear",
+                       coordinate_transformation_mode="half_pixel")
         if activation == tflite.ActivationFunctionType.RELU:
-            return self._node("Relu", [before], name)
-        if activation == tflite.ActivationFunctionType.RELU6:
+            self._node("Relu", [linear], name)
+        elif activation == tflite.ActivationFunctionType.RELU6:
             bounds = [self._shared("zero", 0.0), self._shared("six", 6.0)]
-            return self._node("Clip", [before, *bounds], name)
-        raise SystemExit(f"{self.prefix}: the activation {activation} has no conversion")
+            self._node("Clip", [linear, *bounds], name)
+        elif not is_linear:
+            raise SystemExit(f"{self.prefix}: the activation {activation} has no conversion")
 
     def _name(self, operator: Operator) -> str:
         [out] = operator.outputs
