@@ -31,6 +31,9 @@ pub struct LiftedPose {
     pub joints: [Option<P3d>; LANDMARKS],
     /// Shoulders and hips: where one of a pair has no depth, it is where the network guesses it from the other.
     pub trunk: TrunkSides,
+    /// Size of the person over that of a grown-up, by depth and the landmarks' pixels; `None` without readings. Roughly: one
+    /// man has 0.8 to 1.1.
+    pub size: Option<f64>,
 }
 
 impl LiftedPose {
@@ -75,14 +78,16 @@ impl LandmarkLifter {
             });
         }
         (self.registration).depth_in_color(depth, &mut self.registered)?;
-        let Some(placed) = PlacedGuess::new(pose, &self.registered, &self.color, &self.settings)
-        else {
+        let placed = PlacedGuess::new(pose, &self.registered, &self.color, &self.settings);
+        let size = placed.as_ref().map(|placed| placed.scale);
+        let [least, most] = self.settings.sizes;
+        let Some(placed) = placed.filter(|placed| (least..=most).contains(&placed.scale)) else {
             return Ok(LiftedPose {
                 joints: [None; LANDMARKS],
                 trunk: TrunkSides::default(),
+                size,
             });
         };
-
         let joints = std::array::from_fn(|k| {
             let landmark = &pose.landmarks[k];
             let depth = self.depth_of(landmark, &placed)?;
@@ -94,7 +99,11 @@ impl LandmarkLifter {
             shoulders: pair(LandmarkKind::LeftShoulder, LandmarkKind::RightShoulder),
             hips: pair(LandmarkKind::LeftHip, LandmarkKind::RightHip),
         };
-        Ok(LiftedPose { joints, trunk })
+        Ok(LiftedPose {
+            joints,
+            trunk,
+            size,
+        })
     }
 
     /// Depth of a landmark's surface along the colour camera's axis, metres.
@@ -140,8 +149,9 @@ fn unproject(color: &Intrinsics, [u, v]: [f32; 2], depth: f64) -> P3d {
 mod tests {
     use super::*;
     use crate::PersonRegion;
-    use nalgebra::Vector3;
-    use tryon_geometry::math::V3;
+    use nalgebra::{UnitQuaternion, Vector3};
+    use std::f64::consts::FRAC_PI_2;
+    use tryon_geometry::math::{V3, V3d};
 
     const CAMERA: Intrinsics = Intrinsics {
         width: 320,
@@ -204,6 +214,8 @@ mod tests {
             let left = lifted.at(LandmarkKind::LeftShoulder).expect("seen");
             let depth = 2.0 + f64::from(scale * 0.2 * turn.sin());
             assert!((left.z - depth).abs() < 2e-3, "{left}");
+            let size = lifted.size.expect("readings");
+            assert!((size - f64::from(scale)).abs() < 0.1, "{size}");
             assert!(
                 (yaw(&lifted) - f64::from(turn)).abs() < 0.05,
                 "{turn}: {}",
@@ -234,6 +246,28 @@ mod tests {
         }
     }
 
+    /// A flat scene at 2 m, seen by a colour camera 10 cm to the right that is rolled by a quarter turn.
+    #[test]
+    fn joints_are_in_the_depth_cameras_frame() {
+        let (pose, mut depth) = scene(0.0, 1.0);
+        depth.data_mut().fill(2000);
+        let roll = UnitQuaternion::from_axis_angle(&V3d::z_axis(), FRAC_PI_2);
+        let calibration = Calibration {
+            depth: Intrinsics {
+                fx: 150.0,
+                ..CAMERA
+            },
+            color: Some(CAMERA),
+            color_from_depth: Rigid::from_parts(roll * V3d::new(-0.1, 0.0, 0.0), roll),
+        };
+        let mut lifter = LandmarkLifter::new(calibration);
+        let lifted = lifter.lift(&depth, &pose).expect("sizes");
+        let shoulder = lifted.at(LandmarkKind::RightShoulder).expect("seen");
+        // 0.2 m to the left and 0.2 m up in the colour camera: in the depth camera to the left and below.
+        let want = P3d::new(0.1 - 0.2, 0.2, 2.0);
+        assert!((shoulder - want).norm() < 0.01, "{shoulder}");
+    }
+
     #[test]
     fn nothing_is_lifted_without_readings_and_foreign_sizes_are_refused() {
         let (mut pose, depth) = scene(0.0, 1.0);
@@ -242,6 +276,11 @@ mod tests {
             (empty.joints, empty.trunk),
             ([None; LANDMARKS], TrunkSides::default())
         );
+        assert_eq!(empty.size, None);
+        // A person of 30 cm.
+        let (doll, depth_of_doll) = scene(0.0, 0.2);
+        let doll = lift(&doll, &depth_of_doll);
+        assert!(doll.size.is_some_and(|size| size < 0.3) && doll.joints == [None; LANDMARKS]);
         for landmark in &mut pose.landmarks {
             landmark.visibility = 0.1;
         }

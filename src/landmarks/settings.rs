@@ -25,6 +25,8 @@ settings! {
         pub window: f32 = 0.015,
         /// Least share of the square's readings that must lie at the joint.
         pub share: f32 = 0.2,
+        /// Least and largest size of a person over that of a grown-up; others are pictures on cups and walls, and have no joints.
+        pub sizes: [f64; 2] = [0.4, 1.5],
         /// Depth by which readings may be nearer than the network expects them (m); nearer ones hide the joint. On `uva_turn`
         /// a shoulder behind the trunk lies 0.19 to 0.35 before its place, a seen one less than 0.15.
         pub nearer: f64 = 0.15,

@@ -5,7 +5,7 @@ use crate::network::LandmarkNetwork;
 use crate::{LandmarkLifter, Landmarker, PersonRegion, PoseLandmarks, model_file, shared_model};
 use serde_json::Value;
 use std::path::Path;
-use tryon_formats::{RgbdFolder, RgbdSource, shared_data};
+use tryon_formats::{RgbdFolder, RgbdSource, open_recording, shared_data};
 use tryon_geometry::camera::{ColorImage, RgbdFrame};
 use tryon_geometry::math::V3;
 
@@ -125,6 +125,11 @@ fn yaw_errors(is_followed: bool) -> Option<Vec<f64>> {
         let lifted = lifter.lift(&frame.depth, &pose).expect("sizes");
         let yaw = lifted.trunk.yaw(&V3::new(0.0, -1.0, 0.0)).expect("a trunk");
         let error = (yaw - truth).sin().atan2((yaw - truth).cos()).to_degrees();
+        assert!(
+            lifted.size.is_some_and(|size| (0.6..1.3).contains(&size)),
+            "{:?}",
+            lifted.size
+        );
         errors.push(error.abs());
     }
     errors.sort_by(f64::total_cmp);
@@ -192,6 +197,26 @@ fn people_are_found_at_any_roll() {
                 "{name} at {degrees}°: {far:?}"
             );
         }
+    }
+}
+
+/// A figure drawn on a mug is found, and is too small for a person.
+#[test]
+fn a_figure_on_a_mug_has_no_joints() {
+    let (Some(mut landmarker), Some(file)) = (
+        landmarker(),
+        shared_data("rgbd/k4a_recording/recording.mkv"),
+    ) else {
+        return;
+    };
+    let mut source = open_recording(&file).expect("a recording");
+    let frame = source.next_frame().expect("readable").expect("a frame");
+    let color = frame.color.as_ref().expect("colour");
+    if let Some(pose) = landmarker.find(color).expect("it runs") {
+        let mut lifter = LandmarkLifter::new(source.calibration().clone());
+        let lifted = lifter.lift(&frame.depth, &pose).expect("sizes");
+        eprintln!("size {:?}", lifted.size);
+        assert!(lifted.joints.iter().all(Option::is_none), "{lifted:?}");
     }
 }
 

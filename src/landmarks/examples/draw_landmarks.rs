@@ -1,13 +1,13 @@
-//! Landmarks drawn over the pictures of an RGBD folder, and what they say: one line of JSON a frame.
+//! Landmarks drawn over the pictures of a recording, and what they say: one line of JSON a frame.
 //!
-//! `cargo run --release -p tryon-landmarks --example draw_landmarks -- target/landmarks.onnx FOLDER OUT`
+//! `cargo run --release -p tryon-landmarks --example draw_landmarks -- target/landmarks.onnx RECORDING OUT`
 #![allow(clippy::print_stdout)]
 
 use std::error::Error;
 use std::path::Path;
 use std::time::Instant;
 use tryon_formats::image::write_png_rgb;
-use tryon_formats::{RgbdFolder, RgbdSource};
+use tryon_formats::open_recording;
 use tryon_geometry::camera::ColorImage;
 use tryon_geometry::math::V3;
 use tryon_landmarks::{LandmarkLifter, Landmarker, PoseLandmarks};
@@ -36,11 +36,11 @@ const BONES: [[usize; 2]; 18] = [
 
 fn main() -> Result<(), Box<dyn Error>> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
-    let [model, folder, out] = arguments.as_slice() else {
-        return Err("draw_landmarks MODEL FOLDER OUT".into());
+    let [model, recording, out] = arguments.as_slice() else {
+        return Err("draw_landmarks MODEL RECORDING OUT".into());
     };
     let mut landmarker = Landmarker::open(model)?;
-    let mut source = RgbdFolder::open(Path::new(folder))?;
+    let mut source = open_recording(Path::new(recording))?;
     let mut lifter = LandmarkLifter::new(source.calibration().clone());
     std::fs::create_dir_all(out)?;
     while let Some(frame) = source.next_frame()? {
@@ -54,12 +54,12 @@ fn main() -> Result<(), Box<dyn Error>> {
         let lifted = lifter.lift(&frame.depth, &pose)?;
         let all_ms = start.elapsed().as_secs_f64() * 1e3;
         let yaw = lifted.trunk.yaw(&V3::new(0.0, -1.0, 0.0));
+        let yaw = yaw.map_or("null".to_owned(), |yaw| format!("{:.0}", yaw.to_degrees()));
         println!(
-            "{{\"frame\": {}, \"presence\": {:.3}, \"yaw_if_level\": {:.0}, \"joints\": {}, \"find_ms\": {found_ms:.1}, \
+            "{{\"frame\": {}, \"presence\": {:.3}, \"yaw_if_level\": {yaw}, \"joints\": {}, \"find_ms\": {found_ms:.1}, \
              \"lift_ms\": {:.1}, \"pixels\": {:?}}}",
             frame.sequence,
             pose.presence,
-            yaw.unwrap_or(f64::NAN).to_degrees(),
             lifted.joints.iter().flatten().count(),
             all_ms - found_ms,
             pose.landmarks.map(|l| l.pixel)
