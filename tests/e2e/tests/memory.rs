@@ -24,12 +24,12 @@ static ALLOCATOR: cap::Cap<Zeroing> = cap::Cap::new(ZEROING, usize::MAX);
 const WARM: usize = 10;
 /// Sessions between two counts.
 const EVERY: usize = 10;
-/// Sessions after the first count: few enough that one body that stays shows (25 kB of each). The variable asks for more.
-const COUNTED: usize = 20;
+/// Sessions after the first count: few enough that one body that stays shows (50 kB of each). The variable asks for more.
+const COUNTED: usize = 10;
 const SESSIONS: &str = "TRYON_SESSIONS";
 /// Most bytes of a session that stay. One body is 0.5 MB, one outfit 3 MB. The first 40 sessions fill nodes of epochs, of
-/// which a thread holds 64 at the most (docs/decisions/074): 8.4 kB of each of the first 20 counted, 1.1 kB of each after 40.
-const MOST_KEPT: f64 = 16e3;
+/// which a thread holds 64 at the most (docs/decisions/074): 4 to 8 kB of each of the first 20 counted, 1.1 kB after 40.
+const MOST_KEPT: f64 = 25e3;
 
 /// Bytes of this process.
 struct Memory {
