@@ -11,6 +11,8 @@ use tryon_geometry::mesh::Face;
 const SECTORS: usize = 24;
 /// Distance between the planes across a part, metres.
 const SPACING: f32 = 0.05;
+/// Distance of the last planes from the origin of the body, metres: as far as skin is searched.
+const FARTHEST: f32 = 10.0;
 /// Depth below the skin from which cloth is around nothing, metres: bodies that are guessed under their clothes are 2 cm off.
 const DEEP: f32 = 0.03;
 
@@ -146,9 +148,10 @@ impl PartAxes {
             });
             Some((level, [ends.next()?, ends.next()?]))
         };
-        (low.ceil() as i32..=high.floor() as i32)
-            .filter_map(cut)
-            .collect()
+        // A triangle that leaves the scene has no end of planes.
+        let last = FARTHEST / SPACING;
+        let [low, high] = [low.ceil(), high.floor()].map(|level| level.clamp(-last, last) as i32);
+        (low..=high).filter_map(cut).collect()
     }
 }
 
@@ -184,6 +187,15 @@ mod tests {
         assert!(sleeve > 0.9, "{sleeve}");
         assert_eq!(share(|_| false, 0.01), 0.0);
         assert_eq!(share(is_trunk, -0.05), 0.0, "inside");
+    }
+
+    #[test]
+    fn a_triangle_that_leaves_the_scene_is_cut_by_the_planes_of_the_scene_alone() {
+        let t = embedded::template();
+        let trunk = PartAxes::new(&t, BodyPart::Trunk).expect("a trunk");
+        let far = P3::new(0.0, 1e9, 0.0);
+        let lines = trunk.cuts([P3::origin(), P3::new(0.1, 0.0, 0.0), far]);
+        assert_eq!(lines.len() as f32, FARTHEST / SPACING);
     }
 
     /// A square that the body passes through like a ring through a finger, but without a hole.
