@@ -18,7 +18,7 @@ use tryon::tracking::registration::{
     Association, Dof, Metric, ModelPoints, NormalEquations, Observation, PairingConfig,
     PairingScratch, pair_surfaces,
 };
-use tryon::tracking::segment::part_forest::{PartForest, PartScratch, PersonCells};
+use tryon::tracking::segment::part_network::{PartNetwork, PersonCells, PersonParts};
 use tryon::tracking::segment::{
     Contour, PersonChoice, SegmentScratch, contour, find_person, find_planes,
 };
@@ -266,20 +266,17 @@ fn equations(c: &mut Criterion) {
 
 fn parts(c: &mut Criterion) {
     let Readings { grid, cells, .. } = readings();
-    let (forest, mut scratch) = (PartForest::embedded(), PartScratch::default());
+    let (network, mut parts) = (PartNetwork::embedded(), PersonParts::default());
     let person = |cells| PersonCells {
         cloud: &grid,
         cells,
         up: V3::new(0.0, -1.0, 0.0),
     };
-    c.bench_function("parts/classify", |b| {
-        b.iter(|| forest.classify(&person(&cells), &mut scratch).len());
-    });
-    c.bench_function("parts/propose", |b| {
-        b.iter(|| forest.propose(&person(&cells), &mut scratch).len());
+    c.bench_function("parts/person", |b| {
+        b.iter(|| network.infer(&person(&cells), &mut parts));
     });
     c.bench_function("parts/nobody", |b| {
-        b.iter(|| forest.propose(&person(&[]), &mut scratch).len());
+        b.iter(|| network.infer(&person(&[]), &mut parts));
     });
 }
 

@@ -144,7 +144,7 @@ impl FurnitureMesh {
     }
 
     /// A box between two corners.
-    fn block(&mut self, low: [f32; 3], high: [f32; 3]) {
+    pub(super) fn block(&mut self, low: [f32; 3], high: [f32; 3]) {
         let first = self.vertices.len() as u32;
         for k in 0..8 {
             let pick = |d: usize| if k >> d & 1 == 0 { low[d] } else { high[d] };

@@ -13,7 +13,7 @@
 //! - True outline against occlusion edges: [`mod@segment::edges`].
 //! - Ends of limbs: [`mod@segment::extremities`].
 //! - Hands beyond sleeves without return: [`mod@segment::hands`].
-//! - Body parts and yaw by a forest on depth differences: [`mod@segment::part_forest`].
+//! - Body parts, joints and yaw by a network: [`mod@segment::part_network`].
 //! - Joints and poses from it: [`mod@part_classes`], [`mod@start::joint_proposals`], [`mod@start::facing`], [`mod@start::proposed_pose`].
 //!
 //! Pose:
@@ -45,7 +45,7 @@
 //! - Jitter: [`mod@fit::pose_filter`].
 //! - Unchanged frames: [`mod@change_detection`].
 //! - Body in free space, readings left uncovered: [`mod@assess::agreement`].
-//! - Person or thing: [`mod@assess::person_evidence`].
+//! - Person or thing: [`mod@assess::person_evidence`]. Front or back: [`mod@assess::facing_belief`]. Both: [`mod@doubt`].
 //! - Roll of a camera without a floor: [`mod@start::gravity`].
 //! - Confidence: [`mod@assess::confidence`].
 //! - Searching, tracking, lost: [`mod@status`].
@@ -61,6 +61,7 @@
 mod adaptation;
 mod assess;
 mod change_detection;
+mod doubt;
 mod fit;
 mod known_subject;
 mod model;

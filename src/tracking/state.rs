@@ -2,7 +2,7 @@
 
 use super::change_detection::DepthReference;
 use super::status::{LostReason, Status};
-use crate::assess::{PersonBelief, Seat, Verdict};
+use crate::assess::{FacingBelief, PersonBelief, Seat};
 use crate::fit::{FootMemory, RecentPoses};
 use crate::model::TrackerModel;
 use crate::recover::RepairTimer;
@@ -57,6 +57,12 @@ pub struct TrackerState {
     /// Test whether the subject is a person.
     #[serde(default)]
     pub(super) belief: PersonBelief,
+    /// The subject is followed, but maybe nobody, or turned around: not live.
+    #[serde(default)]
+    pub(super) is_unsure: bool,
+    /// Test of the subject's facing; `None` without a subject.
+    #[serde(default)]
+    pub(super) facing: Option<FacingBelief>,
     /// Mean of the subject's readings, camera frame, metres.
     pub(super) centre: P3,
     /// Fit of the last pose: share of explained readings, residual in metres.
@@ -120,6 +126,8 @@ impl TrackerState {
             disagreeing: 0,
             refusals: Refusals::default(),
             belief: PersonBelief::default(),
+            facing: None,
+            is_unsure: false,
             centre: P3::origin(),
             quality: [0.0; 2],
             highest_hips: None,
@@ -143,6 +151,7 @@ impl TrackerState {
             reason: LostReason::NoPerson,
         };
         self.belief = PersonBelief::given(&model.config.assess.belief);
+        self.facing = Some(FacingBelief::given(&model.config.assess.facing));
         self.centre = P3::from(root.cast::<f32>());
         self.before = None;
         self.reference = None;
@@ -170,7 +179,7 @@ impl TrackerState {
     }
     /// True with a pose to follow: live, or in doubt for a few frames.
     pub(super) fn is_following(&self) -> bool {
-        self.status.is_live() || self.disagreeing > 0 || self.belief.verdict == Verdict::Unsure
+        self.status.is_live() || self.disagreeing > 0 || self.is_unsure
     }
     /// True once the girths have settled: a size of a garment can be chosen. Size and shape may still change a little.
     pub fn is_sized(&self, config: &TrackerConfig) -> bool {

@@ -8,7 +8,6 @@ use super::state::TrackerState;
 use super::status::{LostReason, Status};
 use super::subject::{StepLog, SubjectFrame};
 use super::workspace::Workspace;
-use crate::assess::Verdict;
 use crate::fit::motion;
 use crate::model::TrackerModel;
 use crate::registration::Observation;
@@ -90,7 +89,7 @@ pub fn follow(
         };
         match subject.track_known(state, workspace, &mut log) {
             Ok(()) => {
-                let is_tested = state.belief.verdict != Verdict::Unsure;
+                let is_tested = !state.is_unsure;
                 if let Some(candidate) = person.candidate.filter(|_| is_tested) {
                     let settings = &model.config.segment.refusals;
                     state.refusals.forget(&candidate, settings);
@@ -245,6 +244,7 @@ fn lose(state: &mut TrackerState, reason: LostReason) {
     }
     (state.bad_frames, state.disagreeing) = (0, 0);
     state.belief.lose();
+    (state.facing, state.is_unsure) = (None, false);
 }
 
 #[cfg(test)]

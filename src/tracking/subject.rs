@@ -1,12 +1,11 @@
 //! One subject in view (Algorithm 1): find or predict → fit → recover → calibrate → filter → commit.
 
+use super::doubt::{FittedSubject, TurnedPose, count_doubt, is_unsure};
 use super::report::{Skipped, StepReport, Stopwatch, TrackingStagesMs};
 use super::state::TrackerState;
 use super::status::{LostReason, Status};
 use super::workspace::Workspace;
-use crate::assess::{
-    Agreement, JointConfidence, PersonBelief, PersonEvidence, Seat, Verdict, confidence, sits,
-};
+use crate::assess::{Agreement, JointConfidence, Seat, Verdict, confidence, sits};
 use crate::fit::{
     FitContext, FitReport, FitTerms, FloorStance, FootMemory, HiddenKnees, PoseFilter, Prediction,
     assign_hands, fit_pose, floor_below, highest_hips, predict,
@@ -16,10 +15,10 @@ use crate::recover::{HiddenLimb, Repair};
 use crate::registration::Observation;
 use crate::registration::residual::FloorPlane;
 use crate::segment::PersonSearch;
-use crate::segment::part_forest::PartScratch;
-use crate::settings::{Schedule, StepSettings};
+use crate::segment::part_network::PersonParts;
+use crate::settings::Schedule;
 use crate::shape::{SizeCalibration, SizeEstimate, first_shapes};
-use crate::start::{BodyProposals, Outline, StartPrior, initial_pose, outline, person_cells};
+use crate::start::{BodyProposals, Outline, StartPrior, initial_pose, outline};
 use nalgebra::Vector3;
 use tryon_body::parts::BodyPart;
 use tryon_body::{BodyShape, BoneTransforms, Pose};
@@ -64,6 +63,13 @@ impl StepLog {
             },
         };
         Self { report, watch }
+    }
+
+    fn add_turn(&mut self, turned: Option<TurnedPose>) {
+        if let Some(turned) = turned {
+            self.report.agreement = turned.agreement;
+            self.report.confidence = turned.confidence;
+        }
     }
 
     fn add_fit(&mut self, model: &TrackerModel, state: &TrackerState, fit: &FitReport) {
@@ -165,7 +171,10 @@ impl SubjectFrame<'_> {
             self.hide_arms(&mut pose, workspace, log);
             classified |= self.repair(state, workspace, &mut pose, &mut fit, log);
         }
-        self.test_person(state, workspace, &pose, classified, fit.matched as f32);
+        if classified || state.is_unsure {
+            let subject = self.fitted(&mut pose, &mut fit);
+            log.add_turn(subject.test(state, workspace, classified));
+        }
         let agrees = log.report.agreement.wrong() <= settings.most_wrong;
         if state.belief.verdict == Verdict::Nobody || found && !agrees {
             if let Some(before) = before {
@@ -177,12 +186,29 @@ impl SubjectFrame<'_> {
         state.subject += u64::from(is_new);
         self.commit(state, workspace, pose, &fit, &log.report.confidence);
         count_doubt(state, agrees, settings)?;
-        if state.belief.verdict == Verdict::Unsure {
+        state.is_unsure = is_unsure(state, &config.assess);
+        if state.is_unsure {
             state.status = status;
         }
         let is_due = self.is_surface_due(good, state);
         workspace.surface_cells = is_due.then(|| self.person.cells.clone());
         Ok(())
+    }
+
+    /// The subject with a fitted pose.
+    fn fitted<'f>(
+        &'f self,
+        pose: &'f mut Pose<Camera>,
+        fit: &'f mut FitReport,
+    ) -> FittedSubject<'f> {
+        FittedSubject {
+            model: self.model,
+            observation: &self.observation,
+            candidate: self.person.candidate.as_ref(),
+            up: self.up,
+            pose,
+            fit,
+        }
     }
 
     /// Adapts size and shape to a fitted pose; the new fit where the pose was fitted again.
@@ -301,9 +327,9 @@ impl SubjectFrame<'_> {
         outline(&self.observation, &up, self.person.cut_below, floor, config)
     }
 
-    /// Proposals of the part forest for this frame.
-    fn proposals(&self, scratch: &mut PartScratch) -> BodyProposals {
-        BodyProposals::new(self.model, &self.observation, &self.up, scratch)
+    /// Proposals of the part network for this frame.
+    fn proposals(&self, parts: &mut PersonParts) -> BodyProposals {
+        BodyProposals::new(self.model, &self.observation, &self.up, parts)
     }
 
     /// Replaces pose and fit by better ones at proposed places where they disagree with the frame or, at times, with the
@@ -322,7 +348,8 @@ impl SubjectFrame<'_> {
             return false;
         }
         let proposals = self.proposals(&mut workspace.parts);
-        let is_contradicted = proposals.contradict(self.model, &workspace.fit.bones);
+        let is_detected = workspace.fit.terms.hands.map(|h| h.is_some());
+        let is_contradicted = proposals.contradict(self.model, &workspace.fit.bones, is_detected);
         if !disagrees && !is_contradicted {
             return true;
         }
@@ -348,39 +375,6 @@ impl SubjectFrame<'_> {
             .record(found, log.report.agreement.wrong(), settings);
         log.report.stages_ms.place += log.watch.lap();
         true
-    }
-
-    /// Tests the subject where it was just found or isn't sure, and where its cells are classified anyway.
-    fn test_person(
-        &self,
-        state: &mut TrackerState,
-        workspace: &mut Workspace,
-        pose: &Pose<Camera>,
-        classified: bool,
-        matched: f32,
-    ) {
-        let found = !state.is_following();
-        if !classified && state.belief.verdict != Verdict::Unsure {
-            return;
-        }
-        if !classified {
-            let person = person_cells(&self.observation, &self.up);
-            self.model.forest.classify(&person, &mut workspace.parts);
-        }
-        let scratch = &mut workspace.fit;
-        scratch.draw(&self.context(&workspace.body), pose);
-        let (image, map) = (&scratch.pairing.image, &workspace.parts.map);
-        let (model, observation) = (self.model, &self.observation);
-        let evidence = PersonEvidence::measure(model, observation, image, map, matched);
-        let config = &model.config;
-        let settings = &config.assess.belief;
-        if found {
-            let candidate = self.person.candidate.as_ref();
-            let refusals = &config.segment.refusals;
-            let refused = candidate.map_or(0.0, |c| state.refusals.log_odds(c, refusals));
-            state.belief = PersonBelief::start(refused, settings);
-        }
-        state.belief.update(evidence, settings);
     }
 
     /// Sets the residuals of a tracked frame and predicts its pose.
@@ -488,23 +482,6 @@ fn size_before(state: &TrackerState, found: bool) -> Option<(SizeEstimate, BodyS
         (false, Verdict::Person) => None,
         (false, _) => Some(Default::default()),
     }
-}
-
-/// Counts frames in doubt: their pose is followed, but not live.
-fn count_doubt(
-    state: &mut TrackerState,
-    agrees: bool,
-    settings: &StepSettings,
-) -> Result<(), LostReason> {
-    let reason = LostReason::Disagreement;
-    state.disagreeing = if agrees { 0 } else { state.disagreeing + 1 };
-    if state.disagreeing > settings.doubt {
-        return Err(reason);
-    }
-    if !agrees {
-        state.status = Status::Lost { reason };
-    }
-    Ok(())
 }
 
 /// Mean of the readings of `cells`, camera frame, metres.

@@ -4,7 +4,7 @@ use super::state::TrackerState;
 use crate::assess::AgreementScratch;
 use crate::fit::FitScratch;
 use crate::model::{PersonalBody, TrackerModel};
-use crate::segment::part_forest::PartScratch;
+use crate::segment::part_network::PersonParts;
 use crate::segment::{Contour, SegmentScratch};
 use crate::shape::SurfaceScratch;
 use tryon_body::{BodyShape, BoneTransforms, RestBody, skin};
@@ -21,7 +21,7 @@ pub struct Workspace {
     pub(super) body: PersonalBody,
     pub(super) fit: FitScratch,
     pub(super) agreement: AgreementScratch,
-    pub(super) parts: PartScratch,
+    pub(super) parts: PersonParts,
     pub(super) surface: SurfaceScratch,
     /// Cells of the subject in the last frame, while an adaptation of the surface to them is due.
     pub(super) surface_cells: Option<Vec<u32>>,

@@ -182,6 +182,38 @@ fn legs_without_depth_leave_the_upper_body_accurate_and_are_flagged() {
     assert!(upper < 15.0 && out.lost == 0 && flagged >= 80);
 }
 
+/// Row `facing_counter` of the reports: everything below row 260 of 480 is a counter at 0.9 m.
+#[test]
+fn a_counter_before_the_legs_turns_nobody_around() {
+    let setting = Setting {
+        room: Some(Default::default()),
+        ..alone()
+    };
+    let (template, mut scene) = scene(setting, 30);
+    for frame in &mut scene.frames {
+        let (width, height) = (frame.depth.width() as usize, frame.depth.height() as usize);
+        frame.depth.data_mut()[height * 260 / 480 * width..].fill(900);
+    }
+    let side = |name: &str| template.skeleton().index(name).expect("joint");
+    let shoulders = [side("left_shoulder"), side("right_shoulder")];
+    let mut reversed = 0;
+    let config = TrackerConfig::default();
+    follow(
+        &template,
+        &config,
+        &scene,
+        |_, model, state, _, workspace| {
+            let (_, bones) = workspace.posed(model, state);
+            let [left, right] = shoulders.map(|j| bones.joints[j].x);
+            reversed += usize::from(state.status.is_live() && left < right);
+        },
+    );
+    assert_eq!(
+        reversed, 0,
+        "live frames in which the body is turned around"
+    );
+}
+
 #[test]
 fn tilted_rolled_and_portrait_cameras_track_alike() {
     let tilted = |down: f64, roll: f64| Setting {

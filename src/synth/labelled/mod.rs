@@ -2,10 +2,11 @@
 //!
 //! A person is a function of seed and number. Each person is seen in several poses.
 
+mod crops;
 mod people;
 mod settings;
 mod stances;
-mod training;
+mod surroundings;
 mod viewpoint;
 
 use super::furniture::NEAR;
@@ -13,22 +14,25 @@ use super::stance::Rig;
 use rand::{Rng, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 use std::sync::Arc;
+use surroundings::{Owner, PosedPerson, Surroundings};
 use tryon_body::{BoneTransforms, RestBody, Template, skin};
 use tryon_geometry::camera::DepthImage;
 use tryon_geometry::math::{P3, P3d, V3, V3d};
 use tryon_geometry::par::Par;
 use tryon_geometry::raster::{Cull, Options, View, VisibilityBuffer, rasterise_with};
 use tryon_geometry::spatial::{Label, OrganisedCloud};
-use tryon_tracking::segment::part_forest::PersonCells;
+use tryon_tracking::part_classes::PART_CLASSES;
+use tryon_tracking::segment::part_network::PersonCells;
 use tryon_tracking::{PartClasses, yaw_of_joints};
 use viewpoint::Viewpoint;
 
+pub use crops::{DEPTH_STEPS, NO_DEPTH, RECORD_BYTES};
 pub use settings::LabelledSettings;
-
-pub use training::{TrainingPlan, train_parts};
 
 /// Label of a cell whose class the render does not give.
 pub const NO_CLASS: u8 = u8::MAX;
+/// Label of a cell that shows something else than the person.
+pub const NOT_PERSON: u8 = PART_CLASSES as u8;
 /// Frames of one person: a shape costs as much as a frame.
 pub const FRAMES_PER_PERSON: usize = 4;
 /// A frame with its truth.
@@ -110,16 +114,29 @@ impl LabelledFrames {
         );
         let to_camera = view.world_from_camera.inverse();
         let place = V3d::new(view.place[0], 0.0, view.place[1]);
-        for j in &mut joints {
-            *j = to_camera.point(&(*j + drop.cast::<f64>() + place));
-        }
+        joints
+            .iter_mut()
+            .for_each(|j| *j += drop.cast::<f64>() + place);
+        let person = PosedPerson {
+            classes: &self.classes,
+            joints: &joints,
+            view: &view,
+        };
+        let surroundings = Surroundings::draw(&self.settings, &person, rng);
+        joints.iter_mut().for_each(|j| *j = to_camera.point(j));
         let rotation = to_camera.iso().cast::<f32>();
         let place = drop + place.cast::<f32>();
         vertices
             .iter_mut()
             .for_each(|v| *v = rotation * (*v + place));
         let up = to_camera.vector(&V3d::y()).cast::<f32>();
-        self.capture(&view, &vertices, rng)
+        let scene = PersonScene {
+            view: &view,
+            vertices: &vertices,
+            joints: &joints,
+            surroundings: &surroundings,
+        };
+        self.capture(&scene, rng)
             .map(|(cloud, cells, labels)| LabelledFrame {
                 cloud,
                 cells,
@@ -149,14 +166,13 @@ impl LabelledFrames {
         (vertices, bones.joints)
     }
 
-    /// Depth image of the vertices with noise, on the grid; cells and their labels.
+    /// Depth image of the scene with noise, on the grid; cells and their labels.
     fn capture(
         &self,
-        view: &Viewpoint,
-        vertices: &[P3],
+        scene: &PersonScene<'_>,
         rng: &mut Pcg64Mcg,
     ) -> Option<(OrganisedCloud, Vec<u32>, Vec<u8>)> {
-        let camera = view.camera;
+        let (view, camera) = (scene.view, scene.view.camera);
         let options = Options {
             par: Par::Seq,
             cull: Cull::Back,
@@ -165,21 +181,24 @@ impl LabelledFrames {
         let pinhole = View::Perspective { camera, near: NEAR };
         let mut buffer = VisibilityBuffer::default();
         let faces = self.template.mesh().faces();
-        rasterise_with(options, &pinhole, vertices, faces, &mut buffer);
+        rasterise_with(options, &pinhole, scene.vertices, faces, &mut buffer);
+        let owners = scene.surroundings.overlay(view, &mut buffer.depth);
         let mut image = view.noise.apply(&camera, &buffer.depth, rng.random(), 0);
         if let Some(step) = view.quantum {
             image = quantised(&image, step);
         }
         let mut cloud = OrganisedCloud::new(&camera, None);
         cloud.sample(&image, self.settings.farthest);
+        let label = |cloud: &OrganisedCloud, cell: u32| {
+            self.label(scene, &buffer, &owners, cloud, cell as usize)
+        };
         let mut cells = self.cells(view, &cloud, rng);
+        cells.retain(|c| label(&cloud, *c) != NOT_PERSON || scene.is_joined(&cloud, *c));
         refine(&mut cloud, &image, &mut cells);
-        if cells.len() < self.settings.least_cells {
-            return None;
-        }
-        let of = |c: &u32| self.label(&buffer, &cloud, *c as usize);
-        let labels = cells.iter().map(of).collect();
-        Some((cloud, cells, labels))
+        let mut labels: Vec<u8> = cells.iter().map(|c| label(&cloud, *c)).collect();
+        drop_strays(&cloud, &mut cells, &mut labels);
+        let own = labels.iter().filter(|l| **l < NOT_PERSON).count();
+        (own >= self.settings.least_cells).then_some((cloud, cells, labels))
     }
 
     /// Cells with a reading, without those lost to the floor and at the outline.
@@ -188,7 +207,7 @@ impl LabelledFrames {
         let floor = if rng.random_bool(settings.floor_loss) {
             rng.random_range(settings.floor_height[0]..settings.floor_height[1])
         } else {
-            0.0
+            f64::NEG_INFINITY
         };
         let loss = rng.random_bool(settings.outline_loss[0]);
         let columns = cloud.size().0 as i32;
@@ -218,22 +237,67 @@ impl LabelledFrames {
     }
 
     /// Class of the rendered surface in a cell at the cell's depth.
-    fn label(&self, buffer: &VisibilityBuffer, cloud: &OrganisedCloud, cell: usize) -> u8 {
+    fn label(
+        &self,
+        scene: &PersonScene<'_>,
+        buffer: &VisibilityBuffer,
+        owners: &[Owner],
+        cloud: &OrganisedCloud,
+        cell: usize,
+    ) -> u8 {
         let (columns, s) = (cloud.size().0, cloud.stride() as usize);
         let (u, v) = (cell % columns * s, cell / columns * s);
         let z = cloud.depth[cell];
-        let (mut best, mut least) = (NO_CLASS, self.settings.same_surface);
+        let (mut best, mut least) = (None, self.settings.same_surface);
         for (du, dv) in [(1, 1), (1, 3), (3, 1), (3, 3), (2, 2)] {
             let (du, dv) = (du * s / 4, dv * s / 4);
             let k = (v + dv) * buffer.width as usize + u + du;
             let off = (buffer.depth[k] - z).abs();
-            if buffer.face[k] != VisibilityBuffer::NONE && off < least {
-                let face = self.template.mesh().faces()[buffer.face[k] as usize];
-                best = self.classes.of_vertex()[face[0] as usize];
-                least = off;
+            if off < least {
+                (best, least) = (Some(k), off);
             }
         }
-        best
+        let Some(pixel) = best else {
+            return NO_CLASS;
+        };
+        match owners[pixel] {
+            Owner::Other => NOT_PERSON,
+            Owner::Worn => self.nearest_class(scene.joints, &cloud.centre(cell)),
+            Owner::Body if buffer.face[pixel] == VisibilityBuffer::NONE => NO_CLASS,
+            Owner::Body => {
+                let face = self.template.mesh().faces()[buffer.face[pixel] as usize];
+                self.classes.of_vertex()[face[0] as usize]
+            }
+        }
+    }
+
+    /// Class whose anchor is nearest to a point.
+    fn nearest_class(&self, joints: &[P3d], p: &P3) -> u8 {
+        let off = |c: &u8| {
+            let anchor = self.classes.anchor_of(*c, joints);
+            anchor.map_or(f64::INFINITY, |a| (a - p.cast::<f64>()).norm())
+        };
+        let nearest = (0..NOT_PERSON).min_by(|a, b| off(a).total_cmp(&off(b)));
+        nearest.unwrap_or(NO_CLASS)
+    }
+}
+
+/// A posed person before a camera, camera frame, metres.
+struct PersonScene<'a> {
+    view: &'a Viewpoint,
+    vertices: &'a [P3],
+    joints: &'a [P3d],
+    surroundings: &'a Surroundings,
+}
+
+impl PersonScene<'_> {
+    /// True for a cell so near to the person's axis that segmentation takes it for theirs.
+    fn is_joined(&self, cloud: &OrganisedCloud, cell: u32) -> bool {
+        let p = cloud.centre(cell as usize).cast::<f64>();
+        let p = self.view.world_from_camera.point(&p);
+        let [x, z] = self.view.place;
+        let off = (p.x - x).hypot(p.z - z);
+        off < f64::from(self.surroundings.reach)
     }
 }
 
@@ -281,6 +345,27 @@ fn quantised(image: &DepthImage, step: u16) -> DepthImage {
     DepthImage::new(image.width(), image.height(), data).unwrap_or_else(|_| image.clone())
 }
 
+/// Drops cells of unknown class beside which nothing of a known class is seen: readings between a thing and what is behind.
+fn drop_strays(cloud: &OrganisedCloud, cells: &mut Vec<u32>, labels: &mut Vec<u8>) {
+    let columns = cloud.size().0 as i32;
+    let mut is_known = vec![false; cloud.depth.len()];
+    let known = cells
+        .iter()
+        .zip(labels.iter())
+        .filter(|(_, l)| **l != NO_CLASS);
+    known.for_each(|(c, _)| is_known[*c as usize] = true);
+    let is_beside = |c: u32| {
+        let (u, v) = (c as i32 % columns, c as i32 / columns);
+        let mut about = (-1..=1).flat_map(|dv| (-1..=1).map(move |du| (u + du, v + dv)));
+        about.any(|(u, v)| cloud.cell(u, v).is_some_and(|k| is_known[k]))
+    };
+    let keep: Vec<bool> = cells.iter().map(|c| is_beside(*c)).collect();
+    let mut kept = keep.iter();
+    cells.retain(|_| kept.next() == Some(&true));
+    let mut kept = keep.iter();
+    labels.retain(|_| kept.next() == Some(&true));
+}
+
 /// Refines the person's cells and drops those that lose their reading.
 fn refine(cloud: &mut OrganisedCloud, image: &DepthImage, cells: &mut Vec<u32>) {
     for &c in cells.iter() {
@@ -294,7 +379,6 @@ fn refine(cloud: &mut OrganisedCloud, image: &DepthImage, cells: &mut Vec<u32>) 
 mod tests {
     use super::*;
     use tryon_body::embedded;
-    use tryon_tracking::part_classes::PART_CLASSES;
 
     /// Largest distance of a part's skin from its anchor, metres: half a thigh under a wide coat.
     const PART_REACH: f64 = 0.45;
@@ -315,6 +399,9 @@ mod tests {
                 cells += 1;
                 if label == NO_CLASS {
                     unknown += 1;
+                    continue;
+                }
+                if label == NOT_PERSON {
                     continue;
                 }
                 seen[usize::from(label)] += 1;

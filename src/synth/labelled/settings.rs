@@ -6,7 +6,7 @@ settings! {
     /// Distributions of people, poses, cameras and losses. Pairs are ranges, shares are of frames.
     pub struct LabelledSettings {
         /// Statures (m).
-        pub statures: [f64; 2] = [1.45, 2.05],
+        pub statures: [f64; 2] = [1.0, 2.05],
         /// Spread of the coefficients (standard deviations): wider than the population.
         pub spread: f64 = 1.3,
         /// Share of people with bumps.
@@ -32,7 +32,7 @@ settings! {
         /// Share of frames from the waist up.
         pub busts: f64 = 0.25,
         /// Distances of whole bodies and of busts (m).
-        pub distances: [[f64; 2]; 2] = [[1.5, 4.0], [0.8, 2.0]],
+        pub distances: [[f64; 2]; 2] = [[1.2, 4.5], [0.8, 2.0]],
         /// Heights of the camera (m).
         pub heights: [f64; 2] = [0.6, 2.2],
         /// Largest tilt (degrees).
@@ -69,7 +69,17 @@ settings! {
         pub table_heights: [f64; 2] = [-0.3, 0.4],
         /// Distances of a vertical border from the pelvis (m).
         pub border_distances: [f64; 2] = [0.02, 0.3],
-        /// Share of the work that rendering is, for the progress.
-        pub rendering: f64 = 0.3,
+        /// Share of people in a skirt, and with long hair.
+        pub skirts: f64 = 0.12,
+        /// See `skirts`.
+        pub long_hair: f64 = 0.2,
+        /// Share of frames with furniture, floor or something held about the person.
+        pub surrounded: f64 = 0.45,
+        /// Share of those whose things segmentation takes for the person.
+        pub joined: f64 = 0.6,
+        /// Distance from the person's axis within which it does (m).
+        pub joined_reach: [f32; 2] = [0.3, 0.9],
+        /// Error of the direction of gravity, where it isn't known from a floor (degrees, standard deviation).
+        pub gravity_error: f32 = 4.0,
     }
 }

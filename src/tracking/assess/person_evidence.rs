@@ -1,13 +1,13 @@
-//! Evidence that a fitted body is a person: the part forest's classes of the subject's cells against the body drawn over
+//! Evidence that a fitted body is a person: the part network's classes of the subject's cells against the body drawn over
 //! them.
 //!
-//! Furniture can be covered by some body. The forest knows neither fit nor pose: on a person its classes are those of the
+//! Furniture can be covered by some body. The network knows neither fit nor pose: on a person its classes are those of the
 //! body in each cell and as frequent as there, on a coat they are not.
 
 use super::agreement::PARTS;
 use crate::model::{PART_CLASSES, PartKind, TrackerModel};
 use crate::registration::{IndexImage, Observation};
-use crate::segment::part_forest::ClassMap;
+use crate::segment::part_network::ClassMap;
 use crate::settings::BeliefSettings;
 use serde::{Deserialize, Serialize};
 use tryon_geometry::spatial::{Label, OrganisedCloud};
@@ -20,7 +20,7 @@ const KINDS: usize = PART_CLASSES.div_ceil(2);
 pub(crate) struct PersonEvidence {
     /// Mean probability, over the subject's cells, of the kind that the body has there; 0 for cells without body.
     pub agreement: f32,
-    /// Common part of the histograms of kinds: of the subject's cells by the forest, of the drawn body's cells. 0 to 1.
+    /// Common part of the histograms of kinds: of the subject's cells by the network, of the drawn body's cells. 0 to 1.
     pub similarity: f32,
     /// Share of the head's cells with a reading that the subject covers.
     pub head: f32,
@@ -125,7 +125,7 @@ impl PersonEvidence {
         settings.start_bias
             + dot(
                 settings.start_weights,
-                [self.similarity, self.head, self.matched],
+                [self.agreement, self.head, self.matched],
             )
     }
 
@@ -258,7 +258,7 @@ impl PersonBelief {
 mod tests {
     use super::*;
     use crate::fit::FitScratch;
-    use crate::segment::part_forest::{PartScratch, PersonCells};
+    use crate::segment::part_network::{PersonCells, PersonParts};
     use crate::test_scene::{DepthScan, TestScene};
     use nalgebra::Vector3;
     use tryon_geometry::camera::DepthImage;
@@ -274,10 +274,11 @@ mod tests {
             cells: observation.cells,
             up: -Vector3::y(),
         };
-        let (mut fit, mut parts) = (FitScratch::default(), PartScratch::default());
+        let (mut fit, mut parts) = (FitScratch::default(), PersonParts::default());
         fit.draw(&context, &scene.pose);
-        let map = scene.model.forest.classify(&person, &mut parts);
-        PersonEvidence::measure(&scene.model, &observation, &fit.pairing.image, map, matched)
+        scene.model.part_network.infer(&person, &mut parts);
+        let (image, map) = (&fit.pairing.image, &parts.map);
+        PersonEvidence::measure(&scene.model, &observation, image, map, matched)
     }
 
     /// A board of a person's height and width at 2 m.

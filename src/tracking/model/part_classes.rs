@@ -1,11 +1,12 @@
-//! Classes of the part forest: from the vertices of a template, and back to its joints.
+//! Classes of body parts: from the vertices of a template, and back to its joints.
 
+use crate::segment::part_network::CLASSES;
 use tryon_body::Template;
 use tryon_body::parts::{BodyPart, BodySegment, BodySide};
 use tryon_geometry::math::P3d;
 
 /// Number of classes: thirteen pairs and the neck.
-pub const PART_CLASSES: usize = 27;
+pub const PART_CLASSES: usize = CLASSES;
 /// The neck's class; of all others the even ones are left, the odd ones right.
 pub const NECK_CLASS: u8 = 26;
 

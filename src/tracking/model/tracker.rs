@@ -4,7 +4,7 @@ use super::leg::{Leg, legs};
 use super::limb::{self, Limb};
 use super::part_classes::PartClasses;
 use super::trunk::Trunk;
-use crate::segment::part_forest::PartForest;
+use crate::segment::part_network::PartNetwork;
 use crate::settings::{Association, TrackerConfig};
 use nalgebra::{Point3, Vector3};
 use std::collections::BTreeMap;
@@ -63,7 +63,7 @@ pub struct TrackerModel {
     /// End point or joint of the head; the root for a skeleton without.
     pub(crate) crown: usize,
     /// Classifier of body parts, and its classes on the template.
-    pub(crate) forest: Arc<PartForest>,
+    pub(crate) part_network: Arc<PartNetwork>,
     pub(crate) part_classes: PartClasses,
     /// Angles of knees, ankles and feet.
     pub(crate) below_knee: Vec<bool>,
@@ -152,7 +152,7 @@ impl TrackerModel {
             parts,
             chest,
             crown,
-            forest: PartForest::embedded(),
+            part_network: PartNetwork::embedded(),
             part_classes,
             below_knee,
             seen_shares,

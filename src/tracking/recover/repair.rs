@@ -1,4 +1,4 @@
-//! Repair of a pose that disagrees with its frame: limbs, then whole bodies, are tried where the part forest proposes them.
+//! Repair of a pose that disagrees with its frame: limbs, then whole bodies, are tried where the part network proposes them.
 
 use crate::assess::{Agreement, AgreementScratch};
 use crate::fit::{FitContext, FitReport, FitScratch, FitTerms, evaluate, fit_pose};
@@ -109,7 +109,11 @@ impl Repair<'_> {
                 return kept;
             }
         }
-        let terms = FitTerms::hypothesis(&self.context.model.config.fit);
+        // A detected hand keeps its arm.
+        let terms = FitTerms {
+            hands: scratch.terms.hands,
+            ..FitTerms::hypothesis(&self.context.model.config.fit)
+        };
         let candidates = scratch
             .with_terms(terms, |s| self.candidates(s))
             .into_iter();

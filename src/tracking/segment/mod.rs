@@ -7,7 +7,7 @@ pub(crate) mod extremities;
 #[cfg(test)]
 mod fixture;
 pub(crate) mod hands;
-pub mod part_forest;
+pub mod part_network;
 pub(crate) mod person;
 mod plane_bands;
 pub(crate) mod plane_search;

@@ -17,6 +17,8 @@ settings! {
         pub confidence: ConfidenceSettings = ConfidenceSettings::default(),
         /// Person or thing.
         pub belief: BeliefSettings = BeliefSettings::default(),
+        /// Facing as the pose does, or the opposite.
+        pub facing: FacingSettings = FacingSettings::default(),
         /// Seated or standing.
         pub seat: SeatSettings = SeatSettings::default(),
     }
@@ -54,18 +56,18 @@ settings! {
         pub full_head: f32 = 0.6,
         /// Covered share that stands for a head out of view.
         pub hidden_head: f32 = 0.45,
-        /// Log odds of a start per unit of similarity, covered head and matched points: logistic regression on the starts of
-        /// `tryon-bench people` and of recordings (docs/decisions/047).
-        pub start_weights: [f32; 3] = [17.6, 8.05, 18.4],
-        /// Log odds of a start at zero, from the same regression.
-        pub start_bias: f32 = -32.4,
+        /// Log odds of a start per unit of agreement, covered head and matched points: logistic regression on the starts of
+        /// `tryon-bench people` (docs/decisions/047).
+        pub start_weights: [f32; 3] = [10.9, 8.6, 9.9],
+        /// Log odds of a start at zero, 1.5 below the same regression's: a mannequin's frames add up.
+        pub start_bias: f32 = -17.6,
         /// Log odds of a followed person per unit of agreement, similarity and covered head. Who was found whole may be
         /// hidden in part later: matched points say nothing any more.
-        pub weights: [f32; 3] = [8.8, 20.0, 14.7],
+        pub weights: [f32; 3] = [11.8, 12.6, 8.0],
         /// Log odds of a followed person at zero.
-        pub bias: f32 = -25.25,
-        /// Summed log odds from which a subject is a person. Larger starts later; the most likely of 205 starts of things
-        /// had 2.6, and things lose matched points in the next frame.
+        pub bias: f32 = -19.8,
+        /// Summed log odds from which a subject is a person. Larger starts later; the most likely of 289 starts of things
+        /// had −0.3.
         pub sure: f32 = 3.0,
         /// Least log odds that earlier refusals leave: a mannequin that is taken away lets a person stand in its place.
         pub most_doubt: f32 = -6.0,
@@ -75,6 +77,21 @@ settings! {
         pub newest: f32 = 0.3,
         /// Running log odds below which a subject no longer is a person. Larger loses who bends down.
         pub keep: f32 = -0.5,
+    }
+
+    /// Settings of the test of the facing.
+    pub struct FacingSettings {
+        /// Summed log odds from which the facing is decided: 0.89. Larger starts later.
+        pub sure: f32 = 2.1,
+        /// Least belief in either facing in one frame: frames alike aren't independent. Smaller lets one frame turn a body.
+        pub least: f32 = 0.03,
+        /// Share of the sum that stays at the next classified frame. Larger remembers an error for longer.
+        pub kept: f32 = 0.8,
+        /// Greatest sum. Larger turns a body that is reversed later.
+        pub most: f32 = 6.0,
+        /// Factor on the cost of a reversed pose up to which the one that faces as the body parts do replaces it: front and
+        /// back fit nearly alike. Larger trusts the body parts above the fit.
+        pub dearer: f64 = 2.0,
     }
 
     /// Settings of the seat.

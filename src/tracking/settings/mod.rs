@@ -3,7 +3,6 @@
 mod assess;
 mod fit;
 mod model;
-mod part_forest;
 mod recover;
 mod registration;
 mod segment;
@@ -12,12 +11,13 @@ mod start;
 mod step;
 mod tracker;
 
-pub use assess::{AssessSettings, BeliefSettings, ConfidenceSettings, SeatSettings};
+pub use assess::{
+    AssessSettings, BeliefSettings, ConfidenceSettings, FacingSettings, SeatSettings,
+};
 pub use fit::{
     FitSettings, HandAssignmentSettings, PredictionSettings, Schedule, StandingSettings,
 };
 pub use model::{ModelSettings, StillCameraSettings};
-pub use part_forest::{ForestSpec, PartVoteSettings};
 pub use recover::{HiddenLimbSettings, RecoverSettings, RepairSettings};
 pub use registration::{Association, FloorSettings, RegistrationSettings};
 pub use segment::{

@@ -1,4 +1,4 @@
-//! Settings of the start: gravity, outline, trunks, proposals of the part forest, hypotheses of limbs.
+//! Settings of the start: gravity, outline, trunks, proposals of the part network, hypotheses of limbs.
 
 use super::settings;
 
@@ -38,13 +38,13 @@ settings! {
         pub elongation: f64 = 4.0,
         /// Cosines between lean and vertical that count, 60° to 15°: arms bend the axis by less, and nobody leans more.
         pub lean_range: [f64; 2] = [0.5, 0.966],
-        /// Poses from the part forest.
+        /// Poses from the part network.
         pub proposals: ProposalSettings = ProposalSettings::default(),
         /// Hypotheses of limbs.
         pub hypotheses: HypothesisSettings = HypothesisSettings::default(),
     }
 
-    /// Settings of the poses from the part forest.
+    /// Settings of the poses from the part network.
     pub struct ProposalSettings {
         /// Longest pair in comparisons of poses that are not fitted yet, metres. Larger blurs the choice, smaller ranks by
         /// few pairs.
@@ -64,9 +64,8 @@ settings! {
         pub turn: f64 = 1.75,
         /// Factor on the cost of a pose beyond `turn`.
         pub turn_cost: f64 = 1.5,
-        /// Factor on the cost of a pose that faces away from a certain facing, less 1. Larger trusts the facing above the
-        /// fit.
-        pub against_facing: f64 = 0.5,
+        /// Growth of the cost of a pose that faces away with the odds of the facing. Larger trusts the facing above the fit.
+        pub against_facing: f64 = 0.2,
         /// Largest distance between the halves of one head, metres.
         pub head: f32 = 0.20,
         /// Least number of trunk joints for an alignment. Fewer leave the turn open.

@@ -33,7 +33,7 @@ settings! {
         pub edge_weight: f64 = 0.0,
         /// Adapt the body's size and shape at the start.
         pub adapt_size: bool = true,
-        /// Try the proposals of the part forest where body and readings disagree.
+        /// Try the proposals of the part network where body and readings disagree.
         pub rescue: bool = true,
         /// Let feet out of view stand on the floor, or on an estimated one.
         pub standing: bool = true,

@@ -1,4 +1,4 @@
-//! Proposals of the part forest for one frame: joints, facing, and poses of the body from them.
+//! Proposals of the part network for one frame: joints, facing, and poses of the body from them.
 
 use super::facing::{Facing, facing};
 use super::joint_proposals::JointProposals;
@@ -6,7 +6,7 @@ use super::proposed_pose::ProposedPoses;
 use crate::fit::{FitContext, FitScratch, evaluate};
 use crate::model::{PartKind, TrackerModel};
 use crate::registration::Observation;
-use crate::segment::part_forest::{PartScratch, PersonCells};
+use crate::segment::part_network::{PersonCells, PersonParts};
 use crate::settings::ProposalSettings;
 use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
 use std::f64::consts::PI;
@@ -24,7 +24,7 @@ pub(crate) struct BodyProposals {
     settings: ProposalSettings,
 }
 
-/// The subject's cells, as the part forest reads them; `up` is the unit vector against gravity, camera frame.
+/// The subject's cells, as the part network reads them; `up` is the unit vector against gravity, camera frame.
 pub(crate) fn person_cells<'a>(
     observation: &Observation<'a>,
     up: &Vector3<f64>,
@@ -42,16 +42,16 @@ impl BodyProposals {
         model: &TrackerModel,
         observation: &Observation<'_>,
         up: &Vector3<f64>,
-        scratch: &mut PartScratch,
+        parts: &mut PersonParts,
     ) -> Self {
         let person = person_cells(observation, up);
-        let found = model.forest.propose(&person, scratch);
-        let joints =
-            JointProposals::new(&model.part_classes, &found, &model.config.start.proposals);
+        model.part_network.infer(&person, parts);
+        let settings = &model.config.start.proposals;
+        let joints = JointProposals::new(&model.part_classes, &parts.joints, settings);
         Self {
             flipped: joints.flipped(&model.part_classes),
             joints,
-            facing: facing(&person, &scratch.yaw),
+            facing: facing(&person, &parts.yaw),
             up: *up,
             settings: model.config.start.proposals,
         }
@@ -64,11 +64,11 @@ impl BodyProposals {
         let settings = &self.settings;
         let has_turned = recent.is_some_and(|r| r.angle_to(&rotation) > settings.turn);
         let turn_cost = if has_turned { settings.turn_cost } else { 1.0 };
-        let confidence = match self.facing {
-            Some(f) if !self.is_doubtful() && self.faces_away(pose) => f64::from(f.confidence),
-            _ => 0.0,
+        let odds = match self.facing {
+            Some(f) if !self.is_doubtful() && self.faces_away(pose) => f.odds(),
+            _ => 1.0,
         };
-        turn_cost * (1.0 + settings.against_facing * confidence)
+        turn_cost * (1.0 + settings.against_facing * (odds - 1.0))
     }
 
     /// True for a pose more than a quarter turn from the facing.
@@ -78,12 +78,22 @@ impl BodyProposals {
             .is_some_and(|f| front.dot(&f.front.cast()) < 0.0)
     }
 
-    /// True where a hand or foot of `bones` is far from all its heavy proposals.
-    pub(crate) fn contradict(&self, model: &TrackerModel, bones: &BoneTransforms) -> bool {
+    /// True where a hand or foot of `bones` is far from all its heavy proposals. A detected hand, `[left, right]`, is surer
+    /// than its proposals.
+    pub(crate) fn contradict(
+        &self,
+        model: &TrackerModel,
+        bones: &BoneTransforms,
+        is_detected: [bool; 2],
+    ) -> bool {
         let settings = &model.config.start.proposals;
         let ends = [PartKind::Hand, PartKind::Foot].into_iter();
-        let mut classes =
-            ends.flat_map(|k| [BodySide::Left, BodySide::Right].map(|side| k.class(side)));
+        let sides = [BodySide::Left, BodySide::Right];
+        let ends = ends.flat_map(|kind| sides.map(|side| (kind, side)));
+        let is_open = |(kind, side): &(PartKind, BodySide)| {
+            *kind == PartKind::Foot || !is_detected[*side as usize]
+        };
+        let mut classes = ends.filter(is_open).map(|(kind, side)| kind.class(side));
         classes.any(|class| {
             let is_heavy = self.joints.of_class(class).any(|(_, w)| w > settings.heavy);
             let Some(end) = model.part_classes.anchor_of(class, &bones.joints) else {
@@ -156,7 +166,7 @@ pub(crate) fn about_body(turn: f64) -> UnitQuaternion<f64> {
     UnitQuaternion::from_axis_angle(&Vector3::y_axis(), turn)
 }
 
-/// `pose` with each limb at its proposal of least cost; `None` where all stay.
+/// `pose` with each limb at its proposal of least cost, but arms whose hand is detected; `None` where all stay.
 fn with_limbs(
     context: &FitContext<'_>,
     joints: &JointProposals,
@@ -167,7 +177,10 @@ fn with_limbs(
     use BodyPart::*;
     let mut least = evaluate(context, pose, settings.reach, scratch).cost;
     let mut best = None;
-    for part in [LeftLeg, RightLeg, LeftArm, RightArm] {
+    let [left, right] = scratch.terms.hands.map(|hand| hand.is_some());
+    let arms = [(LeftArm, left), (RightArm, right)];
+    let open = arms.into_iter().filter(|(_, is_detected)| !is_detected);
+    for part in [LeftLeg, RightLeg].into_iter().chain(open.map(|a| a.0)) {
         let others = proposed(context, joints).limb_poses(best.as_ref().unwrap_or(pose), part);
         least *= settings.cheaper;
         for other in others {

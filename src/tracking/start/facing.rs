@@ -1,7 +1,7 @@
-//! Facing of the person: yaw about gravity from the votes of the part forest.
+//! Facing of the person: yaw about gravity from the belief of the part network.
 
 use crate::model::{PartClasses, PartKind};
-use crate::segment::part_forest::{PersonCells, YAW_BINS, YawBelief};
+use crate::segment::part_network::{PersonCells, YAW_BINS, YawBelief};
 use std::f32::consts::{FRAC_PI_4, TAU};
 use tryon_body::parts::BodySide;
 use tryon_body::{TrunkSides, level_axes};
@@ -20,7 +20,18 @@ pub struct Facing {
     pub confidence: f32,
 }
 
-/// Facing of a person whose yaw the part forest has voted on. `None` without a vote or under a camera straight above.
+/// Least belief in the opposite facing.
+const LEAST_BEYOND: f32 = 0.02;
+
+impl Facing {
+    /// Odds for this facing against the opposite, 1 where undecided.
+    pub(crate) fn odds(&self) -> f64 {
+        let beyond = (0.5 * (1.0 - self.confidence)).max(LEAST_BEYOND);
+        f64::from((1.0 - beyond) / beyond)
+    }
+}
+
+/// Facing of a person whose yaw the part network has seen. `None` without a reading or under a camera straight above.
 pub fn facing(person: &PersonCells<'_>, votes: &YawBelief) -> Option<Facing> {
     let belief = votes.bins;
     let most = (0..YAW_BINS).max_by(|a, b| belief[*a].total_cmp(&belief[*b]))?;

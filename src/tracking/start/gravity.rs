@@ -1,12 +1,12 @@
-//! Direction of gravity where no floor is known: the camera's roll in quarter turns, by the certainty of the part forest.
+//! Direction of gravity where no floor is known: the camera's roll in quarter turns, by the certainty of the part network.
 //!
-//! Cameras are mounted upright, on either side or upside down. The forest's features are upright, so that its classes are
+//! Cameras are mounted upright, on either side or upside down. The network's window is upright, so that its classes are
 //! surest for the right roll.
 
 use super::body_proposals::person_cells;
 use crate::model::TrackerModel;
 use crate::registration::Observation;
-use crate::segment::part_forest::PartScratch;
+use crate::segment::part_network::PersonParts;
 use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
 use tryon_geometry::math::{Camera, Rigid, World};
 
@@ -22,12 +22,13 @@ const UPS: [[f64; 3]; 4] = [
 pub(crate) fn rolled_camera(
     model: &TrackerModel,
     observation: &Observation<'_>,
-    scratch: &mut PartScratch,
+    parts: &mut PersonParts,
 ) -> Rigid<World, Camera> {
     let settings = &model.config.start;
     let mut certainty = |up: &Vector3<f64>| {
         let person = person_cells(observation, up);
-        let map = model.forest.classify(&person, scratch);
+        model.part_network.infer(&person, parts);
+        let map = &parts.map;
         let most = (0..map.len()).map(|i| map.shares(i).iter().copied().fold(0.0, f32::max));
         most.sum::<f32>()
     };
@@ -58,8 +59,8 @@ mod tests {
     /// Upward direction found for the image.
     fn up_in(scene: &TestScene, image: &DepthImage) -> Vector3<f64> {
         let scan = DepthScan::new(&scene.model, image).background_removed();
-        let scratch = &mut PartScratch::default();
-        let camera = rolled_camera(&scene.model, &scan.observation(), scratch);
+        let parts = &mut PersonParts::default();
+        let camera = rolled_camera(&scene.model, &scan.observation(), parts);
         camera.inverse().vector(&Vector3::y())
     }
 

@@ -1,4 +1,4 @@
-//! Initial pose: the part forest's proposals, and in doubt trunks by outline and principal axes with hypotheses of arms and
+//! Initial pose: the part network's proposals, and in doubt trunks by outline and principal axes with hypotheses of arms and
 //! legs.
 
 use super::body_proposals::{BodyProposals, about_body, upright};
@@ -108,7 +108,7 @@ pub(crate) struct StartPrior<'a> {
     pub up: &'a Vector3<f64>,
     /// Root's rotation of a moment ago: nobody turns around between two frames, while front and back may cost the same.
     pub recent: Option<UnitQuaternion<f64>>,
-    /// Proposals of the part forest.
+    /// Proposals of the part network.
     pub proposals: &'a BodyProposals,
 }
 

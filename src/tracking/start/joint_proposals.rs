@@ -1,7 +1,7 @@
-//! Proposed places of a template's joints, from the part forest.
+//! Proposed places of a template's joints, from the part network.
 
 use crate::model::{NECK_CLASS, PartClasses, PartKind};
-use crate::segment::part_forest::JointProposal;
+use crate::segment::part_network::JointProposal;
 use crate::settings::ProposalSettings;
 use tryon_body::parts::BodySide;
 use tryon_geometry::math::P3;

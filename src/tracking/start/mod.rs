@@ -1,4 +1,4 @@
-//! Poses without a previous one: gravity, proposals of the part forest, hypotheses of limbs, the initial pose.
+//! Poses without a previous one: gravity, proposals of the part network, hypotheses of limbs, the initial pose.
 
 pub(crate) mod body_proposals;
 pub(crate) mod facing;

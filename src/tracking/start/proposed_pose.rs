@@ -148,7 +148,7 @@ fn procrustes(pairs: &[WeightedPair]) -> Option<nalgebra::Isometry3<f64>> {
 mod tests {
     use super::*;
     use crate::model::{PART_CLASSES, PartClasses};
-    use crate::segment::part_forest::JointProposal;
+    use crate::segment::part_network::JointProposal;
     use crate::test_scene::TestScene;
 
     impl ProposedPoses<'_> {

@@ -44,8 +44,26 @@ pub(crate) enum Command {
     Ccd(CcdArgs),
     /// Make the embedded body: the same bytes each time.
     MakeBody(MakeBodyArgs),
-    /// Train the classifier of body parts on synthetic people, and score it on others.
-    TrainParts(TrainPartsArgs),
+    /// Score the network of body parts on synthetic people and on recordings.
+    ScoreParts(ScorePartsArgs),
+    /// Render the synthetic people from which `tools/part_network` trains: one record a picture.
+    RenderPeople(RenderPeopleArgs),
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct RenderPeopleArgs {
+    /// File to write; its layout is that of `tryon::synth::labelled::LabelledFrames::write_crops`.
+    #[arg(long, value_name = "FILE")]
+    pub(crate) out: PathBuf,
+    /// People; each is seen in four poses.
+    #[arg(long, default_value_t = 20_000, value_name = "N")]
+    pub(crate) people: u64,
+    /// Seed of all random numbers.
+    #[arg(long, default_value_t = 1, value_name = "S")]
+    pub(crate) seed: u64,
+    /// Worker threads; 0 means one per core.
+    #[arg(long, default_value_t = 0, value_name = "N")]
+    pub(crate) threads: usize,
 }
 
 #[derive(Debug, Args)]
@@ -263,25 +281,19 @@ pub(crate) struct TrackingArgs {
 }
 
 #[derive(Debug, Args)]
-pub(crate) struct TrainPartsArgs {
-    /// Forest to write (with --score: to read); the same bytes for the same flags on any number of threads.
+pub(crate) struct ScorePartsArgs {
+    /// Network by `tools/part_network/train.py`; without it the embedded one.
     #[arg(long, value_name = "FILE")]
-    pub(crate) out: PathBuf,
-    /// Score the forest in FILE instead of training one.
-    #[arg(long)]
-    pub(crate) score: bool,
-    /// Training images.
-    #[arg(long, default_value_t = 14_000, value_name = "N")]
-    pub(crate) images: usize,
-    /// Synthetic images of the score.
+    pub(crate) network: Option<PathBuf>,
+    /// Synthetic images.
     #[arg(long, default_value_t = 1200, value_name = "N")]
-    pub(crate) test_images: usize,
+    pub(crate) images: usize,
+    /// Folder with `itop_stills` and `msr_action3d`, scored as well.
+    #[arg(long, value_name = "DIR")]
+    pub(crate) recordings: Option<PathBuf>,
     /// Seed of all random numbers.
     #[arg(long, default_value_t = 1, value_name = "S")]
     pub(crate) seed: u64,
-    /// Worker threads; 0 means one per core.
-    #[arg(long, default_value_t = 0, value_name = "N")]
-    pub(crate) threads: usize,
 }
 
 #[derive(Debug, Args)]

@@ -9,7 +9,8 @@ mod ccd;
 mod make_body;
 mod measure;
 mod progress;
-mod train_parts;
+mod render_people;
+mod score_parts;
 mod turntable;
 
 use args::{Cli, Command};
@@ -28,7 +29,8 @@ fn main() -> ExitCode {
         Command::Ccd(a) => ccd::run(&a),
         Command::MakeBody(a) => make_body::run(&a),
         Command::Turntable(a) => turntable::run(&a),
-        Command::TrainParts(a) => train_parts::run(&a),
+        Command::ScoreParts(a) => score_parts::run(&a),
+        Command::RenderPeople(a) => render_people::run(&a),
     };
     outcome.unwrap_or_else(|e| {
         eprintln!("tryon-bench: {e:#}");

@@ -6,7 +6,7 @@
 //!
 //! Segmentation:
 //!
-//! - Its score: [`mod@parts`].
+//! - Its score: [`mod@parts`], on recordings: [`mod@parts_recorded`].
 //!
 //! Evidence:
 //!
@@ -39,6 +39,7 @@ mod inside;
 pub mod made_body;
 mod outfit;
 pub mod parts;
+pub mod parts_recorded;
 pub mod people;
 pub mod rest;
 pub mod scans;

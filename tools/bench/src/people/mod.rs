@@ -13,7 +13,7 @@ mod session;
 mod settings;
 mod shops;
 mod sides;
-mod stills;
+pub(crate) mod stills;
 mod unlike;
 
 pub use bars::{Bar, BarTable};

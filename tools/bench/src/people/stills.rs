@@ -36,16 +36,25 @@ const NAMES: [(&str, &[&str]); 15] = [
 
 /// Joints of stills, relative to a root, metres.
 #[derive(serde::Deserialize)]
-struct JointsFile {
-    joint_names: Vec<String>,
-    frames: Vec<StillTruth>,
+pub(crate) struct JointsFile {
+    pub(crate) joint_names: Vec<String>,
+    pub(crate) frames: Vec<StillTruth>,
+}
+
+impl JointsFile {
+    /// Reads `joints.json` of a folder; the fault as text.
+    pub(crate) fn read(folder: &Path) -> Result<Self, String> {
+        let text =
+            std::fs::read_to_string(folder.join("joints.json")).map_err(|e| e.to_string())?;
+        serde_json::from_str(&text).map_err(|e| e.to_string())
+    }
 }
 
 /// Joints of one still.
 #[derive(serde::Deserialize)]
-struct StillTruth {
-    frame: usize,
-    joints: Vec<[f64; 3]>,
+pub(crate) struct StillTruth {
+    pub(crate) frame: usize,
+    pub(crate) joints: Vec<[f64; 3]>,
 }
 
 /// Share of pairs of joints, ours and true, that lie within reach once their mean offset is taken out.
@@ -61,9 +70,7 @@ pub(super) fn measure(settings: &PeopleSettings, data: &Path) -> Result<Vec<Bar>
     let folder = data.join(STILLS);
     let scene = DepthScene::open(&folder)?;
     let fault = |why: String| EvaluateError::new(&scene.name, format!("joints.json: {why}"));
-    let text = std::fs::read_to_string(folder.join("joints.json"));
-    let text = text.map_err(|e| fault(e.to_string()))?;
-    let truth: JointsFile = serde_json::from_str(&text).map_err(|e| fault(e.to_string()))?;
+    let truth = JointsFile::read(&folder).map_err(fault)?;
 
     let template = embedded::template();
     let skeleton = template.skeleton();

@@ -3,13 +3,21 @@
 /// Class distribution of each cell.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ClassMap {
-    pub(super) classes: usize,
-    pub(super) shares: Vec<f32>,
-    /// Sums of the ways to the joint times their shares, shape `[cells × classes]`: right, down, away, `OFFSET_UNIT`s.
-    pub(super) offsets: Vec<[f32; 3]>,
+    classes: usize,
+    shares: Vec<f32>,
 }
 
 impl ClassMap {
+    /// Forgets all shares; so many cells.
+    pub(super) fn clear(&mut self, classes: usize, cells: usize) {
+        self.classes = classes;
+        self.shares.clear();
+        self.shares.resize(classes * cells, 0.0);
+    }
+    /// Shares of the `i`-th cell.
+    pub(super) fn shares_mut(&mut self, i: usize) -> &mut [f32] {
+        &mut self.shares[i * self.classes..(i + 1) * self.classes]
+    }
     /// Number of classes.
     pub fn classes(&self) -> usize {
         self.classes
@@ -22,7 +30,8 @@ impl ClassMap {
     pub fn is_empty(&self) -> bool {
         self.shares.is_empty()
     }
-    /// Shares of all classes at the `i`-th cell, shape `[classes]`; their sum is 1, or 0 for a cell without reading.
+    /// Shares of all classes at the `i`-th cell, shape `[classes]`; their sum is the probability that it shows the person, 0
+    /// for a cell without reading.
     pub fn shares(&self, i: usize) -> &[f32] {
         &self.shares[i * self.classes..(i + 1) * self.classes]
     }
