@@ -92,6 +92,7 @@ pub use tryon_formats as formats;
 pub use tryon_garment as garment;
 pub use tryon_geometry as geometry;
 pub use tryon_inspection as inspection;
+pub use tryon_landmarks as landmarks;
 pub use tryon_synth as synth;
 pub use tryon_tracking as tracking;
 pub use tryon_view as view;

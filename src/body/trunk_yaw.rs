@@ -1,12 +1,13 @@
 //! Yaw of a trunk about gravity, from the joints at its sides.
 
+use serde::{Deserialize, Serialize};
 use tryon_geometry::math::{P3d, V3, V3d};
 
 /// Least length of the level part of a unit direction from which it gives a yaw.
 const LEVEL: f64 = 0.05;
 
 /// Joints at both sides of a trunk, each pair left before right, camera frame, metres; `None` where a pair is not known.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct TrunkSides {
     /// Left and right shoulder.
     pub shoulders: Option<[P3d; 2]>,

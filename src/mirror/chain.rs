@@ -12,7 +12,8 @@ use std::sync::Arc;
 use tryon_body::{BodyShape, Template};
 use tryon_geometry::camera::{Calibration, ColorImage, RgbdFrame};
 use tryon_geometry::math::P3;
-use tryon_tracking::{Status, TrackerConfig, TrackerModel, TrackerState};
+use tryon_landmarks::Landmarker;
+use tryon_tracking::{COLOR_INTERVAL, ColorEye, Status, TrackerConfig, TrackerModel, TrackerState};
 use tryon_view::{Appearance, ImagePyramid, Print, RenderReport};
 
 /// One person, one camera, one outfit: frames in, pictures out.
@@ -21,6 +22,9 @@ pub struct Mirror {
     tracker: TrackerModel,
     tracked: TrackerState,
     tracking_work: tryon_tracking::Workspace,
+    color_eye: Option<ColorEye>,
+    /// Frames so far.
+    frames: u64,
     worn: Option<Worn>,
     shape: Arc<BodyShape>,
     posed: PosedBody,
@@ -46,11 +50,22 @@ impl Mirror {
             tracked: TrackerState::new(&tracker),
             tracker,
             tracking_work: tryon_tracking::Workspace::default(),
+            color_eye: None,
+            frames: 0,
             worn: None,
             shape: Arc::default(),
             posed: PosedBody::default(),
             painter,
         }
+    }
+
+    /// Also tracks by colour, in every fourth frame. The frame waits for it, so that a recording gives the same pictures
+    /// each time.
+    #[must_use]
+    pub fn with_landmarker(mut self, landmarker: Landmarker) -> Self {
+        let calibration = self.tracker.calibration().clone();
+        self.color_eye = Some(ColorEye::new(landmarker, calibration));
+        self
     }
 
     /// Takes one frame through tracking, dressing, cloth and compositing. The subject is dressed in the first frame in
@@ -61,6 +76,15 @@ impl Mirror {
     /// A frame that does not fit the camera, or a garment that cannot be put on.
     pub fn step(&mut self, frame: &RgbdFrame) -> Result<MirrorFrame, MirrorError> {
         let mut timer = StageTimer::start();
+        if let Some(eye) = &mut self.color_eye {
+            if self.frames.is_multiple_of(COLOR_INTERVAL)
+                && let Some(sighting) = eye.look(frame)?
+            {
+                self.tracked.see(sighting);
+            }
+            timer.lap("color");
+        }
+        self.frames += 1;
         let work = &mut self.tracking_work;
         let tracking = tryon_tracking::step(&self.tracker, &mut self.tracked, frame, work)?;
         timer.lap("tracking");

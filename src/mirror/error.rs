@@ -13,6 +13,9 @@ pub enum MirrorError {
     /// The frame does not fit the camera.
     #[error(transparent)]
     Track(#[from] tryon_tracking::StepError),
+    /// The eye for colour.
+    #[error(transparent)]
+    Color(#[from] tryon_tracking::ColorEyeError),
     /// The tracked body cannot be measured.
     #[error(transparent)]
     Measure(#[from] MeasureError),

@@ -2,28 +2,25 @@
 
 use super::state::TrackerState;
 use super::status::{LostReason, Status};
+use super::subject_view::SubjectView;
 use super::workspace::Workspace;
 use crate::assess::{
     Agreement, FacingBelief, FacingVerdict, JointConfidence, PersonBelief, PersonEvidence, Verdict,
     confidence,
 };
 use crate::fit::{FitContext, FitReport, FitTerms, evaluate, fit_pose};
-use crate::model::{PersonalBody, TrackerModel};
-use crate::registration::Observation;
+use crate::model::PersonalBody;
 use crate::segment::CandidateBox;
+use crate::segment::part_network::YawBelief;
 use crate::settings::{AssessSettings, StepSettings};
-use crate::start::{BodyProposals, person_cells, yaw_of_joints};
-use nalgebra::Vector3;
+use crate::start::yaw_of_joints;
 use tryon_body::Pose;
 use tryon_geometry::math::Camera;
 
 /// A subject with its fitted pose.
 pub(super) struct FittedSubject<'a> {
-    pub model: &'a TrackerModel,
-    pub observation: &'a Observation<'a>,
+    pub view: SubjectView<'a>,
     pub candidate: Option<&'a CandidateBox>,
-    /// Unit vector against gravity, camera frame.
-    pub up: Vector3<f64>,
     pub pose: &'a mut Pose<Camera>,
     pub fit: &'a mut FitReport,
 }
@@ -36,29 +33,40 @@ pub(super) struct TurnedPose {
 
 impl FittedSubject<'_> {
     /// Tests whether the subject is a person and faces as its pose does; turns a reversed pose around. `is_classified` with
-    /// the body parts of this frame in the scratch.
+    /// the body parts of this frame in the scratch; else a sighting in colour tests the facing alone.
     pub(super) fn test(
         mut self,
         state: &mut TrackerState,
         workspace: &mut Workspace,
         is_classified: bool,
     ) -> Option<TurnedPose> {
-        if !is_classified {
-            let person = person_cells(self.observation, &self.up);
-            let network = &self.model.part_network;
-            network.infer(&person, &mut workspace.parts);
+        let is_due = is_classified || state.is_unsure;
+        if is_due {
+            if !is_classified {
+                self.view.see_parts(&mut workspace.parts);
+            }
+            self.test_person(state, workspace);
+            if state.belief.verdict == Verdict::Nobody {
+                return None;
+            }
         }
-        self.test_person(state, workspace);
-        (state.belief.verdict != Verdict::Nobody)
-            .then(|| self.test_facing(state, workspace))
-            .flatten()
+        let seen = is_due.then_some(workspace.parts.yaw);
+        let votes = seen.or_else(|| self.view.yaw_in_color())?;
+        let is_reversed = self.is_reversed(state, workspace, &votes);
+        if !is_reversed {
+            return None;
+        }
+        if !is_due {
+            self.view.see_parts(&mut workspace.parts);
+        }
+        self.turn_around(state, workspace)
     }
 
     fn context<'c>(&'c self, body: &'c PersonalBody) -> FitContext<'c> {
         FitContext {
-            model: self.model,
+            model: self.view.model,
             body,
-            observation: self.observation,
+            observation: self.view.observation,
         }
     }
 
@@ -67,8 +75,9 @@ impl FittedSubject<'_> {
         scratch.draw(&self.context(&workspace.body), self.pose);
         let (image, map) = (&scratch.pairing.image, &workspace.parts.map);
         let matched = self.fit.matched as f32;
-        let evidence = PersonEvidence::measure(self.model, self.observation, image, map, matched);
-        let config = &self.model.config;
+        let evidence =
+            PersonEvidence::measure(self.view.model, self.view.observation, image, map, matched);
+        let config = &self.view.model.config;
         let settings = &config.assess.belief;
         if !state.is_following() {
             let refusals = &config.segment.refusals;
@@ -80,20 +89,31 @@ impl FittedSubject<'_> {
         state.belief.update(evidence, settings);
     }
 
-    fn test_facing(
+    /// Adds the belief in the yaw to that in the pose's facing; true for a pose that is turned around.
+    fn is_reversed(
+        &self,
+        state: &mut TrackerState,
+        workspace: &mut Workspace,
+        votes: &YawBelief,
+    ) -> bool {
+        let model = self.view.model;
+        let settings = &model.config.assess.facing;
+        let joints = &workspace.fit.bones.joints;
+        let yaw = yaw_of_joints(&model.part_classes, joints, &self.view.up.cast());
+        let belief = state.facing.get_or_insert(FacingBelief::NEW);
+        belief.update(yaw, votes, settings);
+        belief.verdict(settings) == FacingVerdict::Reversed
+    }
+
+    /// Replaces pose and fit by those of a body that faces as the body parts do; in doubt where no such body agrees with the
+    /// frame.
+    fn turn_around(
         &mut self,
         state: &mut TrackerState,
         workspace: &mut Workspace,
     ) -> Option<TurnedPose> {
-        let settings = &self.model.config.assess.facing;
-        let joints = &workspace.fit.bones.joints;
-        let yaw = yaw_of_joints(&self.model.part_classes, joints, &self.up.cast());
+        let turned = self.turned(workspace);
         let belief = state.facing.get_or_insert(FacingBelief::NEW);
-        belief.update(yaw, &workspace.parts.yaw, settings);
-        if belief.verdict(settings) != FacingVerdict::Reversed {
-            return None;
-        }
-        let turned = self.turn_around(workspace);
         if turned.is_some() {
             belief.turn();
         } else {
@@ -102,12 +122,9 @@ impl FittedSubject<'_> {
         turned
     }
 
-    /// Replaces pose and fit by those of a body that faces as the body parts do; `None` where no such body agrees with the
-    /// frame.
-    fn turn_around(&mut self, workspace: &mut Workspace) -> Option<TurnedPose> {
-        let config = &self.model.config;
-        let parts = &mut workspace.parts;
-        let proposals = BodyProposals::new(self.model, self.observation, &self.up, parts);
+    fn turned(&mut self, workspace: &mut Workspace) -> Option<TurnedPose> {
+        let config = &self.view.model.config;
+        let proposals = self.view.proposals(&workspace.parts);
         let (context, scratch) = (self.context(&workspace.body), &mut workspace.fit);
         let reach = config.start.reach[1];
         let cost = evaluate(&context, self.pose, reach, scratch).cost;

@@ -46,6 +46,7 @@
 //! - Unchanged frames: [`mod@change_detection`].
 //! - Body in free space, readings left uncovered: [`mod@assess::agreement`].
 //! - Person or thing: [`mod@assess::person_evidence`]. Front or back: [`mod@assess::facing_belief`]. Both: [`mod@doubt`].
+//! - The eye for colour: [`mod@color_eye`], beside the frames: [`mod@background_eye`]; its sightings: [`mod@sighting`].
 //! - Roll of a camera without a floor: [`mod@start::gravity`].
 //! - Confidence: [`mod@assess::confidence`].
 //! - Searching, tracking, lost: [`mod@status`].
@@ -60,7 +61,9 @@
 
 mod adaptation;
 mod assess;
+mod background_eye;
 mod change_detection;
+mod color_eye;
 mod doubt;
 mod fit;
 mod known_subject;
@@ -72,22 +75,27 @@ pub mod segment;
 mod segmentation;
 pub mod settings;
 mod shape;
+mod sighting;
 mod start;
 mod state;
 mod status;
 mod step;
 pub mod still;
 mod subject;
+mod subject_view;
 #[cfg(test)]
 mod test_scene;
 mod workspace;
 
 pub use adaptation::adapt_surface;
 pub use assess::{Agreement, ConfidenceReason, JointConfidence};
+pub use background_eye::BackgroundEye;
+pub use color_eye::{COLOR_INTERVAL, ColorEye, ColorEyeError};
 pub use model::{PartClasses, TrackerModel, part_classes};
 pub use report::{Skipped, StepError, StepReport, TrackingStagesMs};
 pub use settings::TrackerConfig;
 pub use shape::{KnownBody, ShapeFault, SizeEstimate, SurfaceStatistics};
+pub use sighting::ColorSighting;
 pub use start::{Facing, JointProposals, ProposedAnchor, facing, yaw_of_joints};
 pub use state::TrackerState;
 pub use status::{LostReason, Status};

@@ -9,6 +9,7 @@ use crate::recover::RepairTimer;
 use crate::segment::{Refusals, ScenePlanes};
 use crate::settings::TrackerConfig;
 use crate::shape::{Probation, SizeEstimate, SurfaceStatistics};
+use crate::sighting::ColorSighting;
 use nalgebra::{UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
 use tryon_body::{BodyShape, Pose};
@@ -60,6 +61,9 @@ pub struct TrackerState {
     /// The subject is followed, but maybe nobody, or turned around: not live.
     #[serde(default)]
     pub(super) is_unsure: bool,
+    /// Person seen in colour since the last step.
+    #[serde(default)]
+    pub(super) sighting: Option<ColorSighting>,
     /// Test of the subject's facing; `None` without a subject.
     #[serde(default)]
     pub(super) facing: Option<FacingBelief>,
@@ -127,6 +131,7 @@ impl TrackerState {
             refusals: Refusals::default(),
             belief: PersonBelief::default(),
             facing: None,
+            sighting: None,
             is_unsure: false,
             centre: P3::origin(),
             quality: [0.0; 2],
@@ -156,6 +161,10 @@ impl TrackerState {
         self.before = None;
         self.reference = None;
         self.pose_age = 0;
+    }
+    /// Takes what an eye for colour saw in this frame or a moment before; the next step uses it if it is of the subject.
+    pub fn see(&mut self, sighting: ColorSighting) {
+        self.sighting = Some(sighting);
     }
     /// Forgets the subject, keeps the scene.
     pub fn reset(&mut self, model: &TrackerModel) {

@@ -12,7 +12,7 @@ use crate::fit::motion;
 use crate::model::TrackerModel;
 use crate::registration::Observation;
 use crate::segment::{CandidateBox, PersonSearch};
-use crate::start::rolled_camera;
+use crate::start::{person_cells, rolled_camera};
 use nalgebra::Vector3;
 use tryon_geometry::camera::{DepthImage, RgbdFrame};
 use tryon_geometry::spatial::OrganisedCloud;
@@ -80,12 +80,17 @@ pub fn follow(
             let scratch = &mut workspace.parts;
             state.world_from_camera = rolled_camera(model, &observation, scratch);
         }
+        let up = state.world_from_camera.inverse().vector(&Vector3::y());
+        let cells = person_cells(&observation, &up);
+        let settings = &model.config.assess.sighting;
+        let sighting = state.sighting.take();
         let subject = SubjectFrame {
             model,
             frame,
             person: &person,
             observation,
-            up: state.world_from_camera.inverse().vector(&Vector3::y()),
+            up,
+            sighting: sighting.filter(|s| s.is_of(&cells, frame.time_ns, settings)),
         };
         match subject.track_known(state, workspace, &mut log) {
             Ok(()) => {

@@ -4,6 +4,7 @@ use super::doubt::{FittedSubject, TurnedPose, count_doubt, is_unsure};
 use super::report::{Skipped, StepReport, Stopwatch, TrackingStagesMs};
 use super::state::TrackerState;
 use super::status::{LostReason, Status};
+use super::subject_view::SubjectView;
 use super::workspace::Workspace;
 use crate::assess::{Agreement, JointConfidence, Seat, Verdict, confidence, sits};
 use crate::fit::{
@@ -18,6 +19,7 @@ use crate::segment::PersonSearch;
 use crate::segment::part_network::PersonParts;
 use crate::settings::Schedule;
 use crate::shape::{SizeCalibration, SizeEstimate, first_shapes};
+use crate::sighting::ColorSighting;
 use crate::start::{BodyProposals, Outline, StartPrior, initial_pose, outline};
 use nalgebra::Vector3;
 use tryon_body::parts::BodyPart;
@@ -100,9 +102,20 @@ pub(super) struct SubjectFrame<'a> {
     pub observation: Observation<'a>,
     /// Unit vector against gravity, camera frame.
     pub up: Vector3<f64>,
+    /// Of this subject in colour.
+    pub sighting: Option<ColorSighting>,
 }
 
 impl SubjectFrame<'_> {
+    fn view(&self) -> SubjectView<'_> {
+        SubjectView {
+            model: self.model,
+            observation: &self.observation,
+            up: self.up,
+            sighting: self.sighting.as_ref(),
+        }
+    }
+
     fn context<'c>(&'c self, body: &'c PersonalBody) -> FitContext<'c> {
         FitContext {
             model: self.model,
@@ -171,7 +184,7 @@ impl SubjectFrame<'_> {
             self.hide_arms(&mut pose, workspace, log);
             classified |= self.repair(state, workspace, &mut pose, &mut fit, log);
         }
-        if classified || state.is_unsure {
+        if classified || state.is_unsure || self.sighting.is_some() {
             let subject = self.fitted(&mut pose, &mut fit);
             log.add_turn(subject.test(state, workspace, classified));
         }
@@ -202,10 +215,8 @@ impl SubjectFrame<'_> {
         fit: &'f mut FitReport,
     ) -> FittedSubject<'f> {
         FittedSubject {
-            model: self.model,
-            observation: &self.observation,
+            view: self.view(),
             candidate: self.person.candidate.as_ref(),
-            up: self.up,
             pose,
             fit,
         }
@@ -327,9 +338,11 @@ impl SubjectFrame<'_> {
         outline(&self.observation, &up, self.person.cut_below, floor, config)
     }
 
-    /// Proposals of the part network for this frame.
+    /// Proposals of both eyes for this frame.
     fn proposals(&self, parts: &mut PersonParts) -> BodyProposals {
-        BodyProposals::new(self.model, &self.observation, &self.up, parts)
+        let view = self.view();
+        view.see_parts(parts);
+        view.proposals(parts)
     }
 
     /// Replaces pose and fit by better ones at proposed places where they disagree with the frame or, at times, with the

@@ -231,6 +231,9 @@ fn tilted_rolled_and_portrait_cameras_track_alike() {
         ("tilted down by 15°", roomy(tilted(15.0, 0.0))),
         ("portrait", roomy(tilted(0.0, 0.0)).portrait()),
         ("portrait, rolled by 5°", roomy(tilted(2.0, 5.0)).portrait()),
+        ("on its side", roomy(tilted(2.0, 90.0))),
+        ("on its other side", roomy(tilted(2.0, -90.0))),
+        ("upside down", roomy(tilted(2.0, 180.0))),
     ];
     for (name, setting) in cases {
         let (template, own) = scene(setting, 75);

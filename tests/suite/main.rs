@@ -5,6 +5,7 @@
 mod bending;
 mod captured_garments;
 mod cloth;
+mod color;
 mod common;
 mod company;
 mod dance;

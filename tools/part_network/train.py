@@ -37,6 +37,7 @@ RECORD = np.dtype(
 )
 FRAMES = 4  # of one person
 TEST = 1024  # records that the training doesn't see
+FIRST = 12_000  # records at the first step
 NEW = 40  # more records at each step
 # Other side of a class.
 MIRRORED = np.array([c ^ 1 if c < NECK else c for c in range(CLASSES)])
@@ -88,7 +89,7 @@ class PartNetwork(nn.Module):
         self.to_fine = nn.Sequential(*convolution(middle, 64, 1))
         self.from_fine = nn.Sequential(*convolution(fine, 64, 1))
         self.up_fine = nn.Sequential(Block(64, 2), Block(64, 2))
-        self.maps = nn.Conv2d(64, (CLASSES + 1) + 2 * CLASSES, 1)
+        self.maps = nn.Conv2d(64, (CLASSES + 1) + 3 * CLASSES, 1)
         self.yaw = nn.Sequential(nn.Linear(2 * coarse, 96), nn.ReLU(inplace=True), nn.Linear(96, YAW_BINS))
 
     def forward(self, picture):
@@ -100,10 +101,21 @@ class PartNetwork(nn.Module):
         x = self.to_fine(self.up_middle(x))
         x = self.from_fine(fine) + functional.interpolate(x, scale_factor=2.0, mode="nearest")
         maps = self.maps(self.up_fine(x))
-        classes, heat, behind = maps.split([CLASSES + 1, CLASSES, CLASSES], 1)
-        # A joint lies a little behind what is read there.
-        read = functional.avg_pool2d(picture[:, 1:2], 4)
-        return classes, heat, behind + functional.avg_pool2d(picture[:, 0:1], 4) / read.clamp(min=1e-3), yaw
+        classes, heat, share, behind = maps.split([CLASSES + 1, CLASSES, CLASSES, CLASSES], 1)
+        # A joint lies a little behind the nearer or the farther of what is read in a cell: a hand before the trunk shares
+        # its cells with it.
+        near, far, is_read = readings(picture)
+        depth = near + share.sigmoid() * (far - near) + behind
+        return classes, heat, depth * is_read, yaw
+
+
+def readings(picture):
+    """Least and largest depth in each cell, and 1 where the person is read in it."""
+    depth, read = picture[:, 0:1], picture[:, 1:2]
+    beyond = 4.0 * (1.0 - read)  # no depth comes so far
+    near = -functional.max_pool2d(-depth - beyond, 4)
+    far = functional.max_pool2d(depth - beyond, 4)
+    return near, far, functional.max_pool2d(read, 4)
 
 
 def pictures(records, rng):
@@ -153,7 +165,7 @@ GRID = (torch.arange(CELLS) + 0.5) / CELLS
 def losses(outputs, truth):
     """Cross entropy of classes, heat maps and yaw; absolute error of the places and depths that the heat maps give."""
     classes, heat, depth, yaw = outputs
-    _, label, anchors, true_yaw = truth
+    picture, label, anchors, true_yaw = truth
     parts = functional.cross_entropy(classes, label.masked_fill(label == UNKNOWN, -1), ignore_index=-1)
     at, valid = anchors[..., :2], anchors[..., 3] > 0
     seen = valid & (at > 0.0).all(-1) & (at < 1.0).all(-1)
@@ -168,12 +180,14 @@ def losses(outputs, truth):
     share = heat.flatten(2).softmax(-1)
     found_x = (share.unflatten(2, (CELLS, CELLS)).sum(2) * GRID).sum(-1)
     found_y = (share.unflatten(2, (CELLS, CELLS)).sum(3) * GRID).sum(-1)
-    # Depth where the joint is: the Gaussian's mean of the map.
-    near = target / target.sum((2, 3), keepdim=True).clamp(min=1e-6)
-    found_depth = (depth * near).sum((2, 3))
+    # Depth where the joint is: the Gaussian's mean of the map's cells that have a reading.
+    near = target * readings(picture)[2]
+    total = near.sum((2, 3))
+    found_depth = (depth * near).sum((2, 3)) / total.clamp(min=1e-6)
     count = seen.sum().clamp(min=1)
+    is_read = seen & (total > 0.5)
     spread = ((found_x - at[..., 0]).abs() + (found_y - at[..., 1]).abs())[seen].sum() / count
-    away = (found_depth - anchors[..., 2]).abs()[seen].sum() / count
+    away = (found_depth - anchors[..., 2]).abs()[is_read].sum() / is_read.sum().clamp(min=1)
     has_yaw = ~true_yaw.isnan()
     bins = torch.arange(YAW_BINS) * (2 * math.pi / YAW_BINS)
     soft = torch.softmax(12.0 * torch.cos(true_yaw[has_yaw, None] - bins), 1)
@@ -229,11 +243,11 @@ def export(network, path):
     network.train()
 
 
-def first_records(path, step, people, first):
+def first_records(path, step, people):
     """The records that a step draws from: more with each step, so that rendering and training run side by side and a step
     draws from the same ones each time. Waits for them."""
     most = people * FRAMES * 9 // 10  # some people give fewer than four pictures
-    count = min(most, first + NEW * step)
+    count = min(most, FIRST + NEW * step)
     while not path.exists() or path.stat().st_size < count * RECORD.itemsize:
         time.sleep(1.0)
     return np.memmap(path, RECORD, "r", shape=count)
@@ -245,10 +259,8 @@ def main():
     parser.add_argument("--records", type=Path, default=Path("people.bin"), help="rendered people; made if missing")
     parser.add_argument("--people", type=int, default=30_000, help="people to render, four pictures each")
     parser.add_argument("--bench", default="tryon-bench", help="the program that renders")
-    parser.add_argument("--first", type=int, default=12_000, help="records of the first step; each later one has 40 more")
-    parser.add_argument("--weights", type=Path, help="checkpoint of another training whose weights are the first ones")
     parser.add_argument("--checkpoint", type=Path, default=Path("parts.pt"))
-    parser.add_argument("--steps", type=int, default=5000)
+    parser.add_argument("--steps", type=int, default=7500)
     parser.add_argument("--batch", type=int, default=64)
     parser.add_argument("--rate", type=float, default=3e-3)
     parser.add_argument("--seed", type=int, default=1)
@@ -263,8 +275,6 @@ def main():
     steps = args.steps
     optimiser = torch.optim.AdamW(network.parameters(), lr=args.rate, weight_decay=1e-4)
     schedule = torch.optim.lr_scheduler.OneCycleLR(optimiser, args.rate, total_steps=steps, pct_start=0.08)
-    if args.weights:
-        network.load_state_dict(torch.load(args.weights, weights_only=True)["network"])
     first = 0
     if args.checkpoint.exists():
         saved = torch.load(args.checkpoint, weights_only=True)
@@ -277,7 +287,7 @@ def main():
     for step in range(first, steps):
         # A function of seed and step, so that a continued training is the same.
         rng = np.random.default_rng((args.seed, step))
-        records = first_records(args.records, step, args.people, args.first)
+        records = first_records(args.records, step, args.people)
         chosen = np.sort(rng.integers(TEST, len(records), args.batch))
         truth = pictures(records[chosen], rng)
         outputs = network(truth[0].to(memory_format=torch.channels_last))

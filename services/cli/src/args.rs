@@ -29,8 +29,10 @@ pub(crate) use token::{
 
 use crate::input::GivenChoice;
 use crate::recording::RecordingArgs;
+use anyhow::Result;
 use clap::{Args, Parser, Subcommand};
 use std::path::PathBuf;
+use tryon::landmarks::Landmarker;
 
 /// Live virtual try-on: a depth camera records a person, the mirror shows the person in other garments.
 #[derive(Debug, Parser)]
@@ -92,6 +94,27 @@ pub(crate) enum Command {
 }
 
 #[derive(Debug, Args)]
+pub(crate) struct ColorArgs {
+    /// Tracks by colour as well, with the model that `tools/landmarks/convert` makes; without it by depth alone.
+    #[arg(long, value_name = "FILE")]
+    pub(crate) color_model: Option<PathBuf>,
+}
+
+impl ColorArgs {
+    /// The networks of the model that was named.
+    ///
+    /// # Errors
+    /// A file that is missing or not the model.
+    pub(crate) fn landmarker(&self) -> Result<Option<Landmarker>> {
+        Ok(self
+            .color_model
+            .as_ref()
+            .map(Landmarker::open)
+            .transpose()?)
+    }
+}
+
+#[derive(Debug, Args)]
 pub(crate) struct RunArgs {
     /// A recording: an RGBD folder, .mcap, .bag, .db3 or a rosbag2 folder, Azure Kinect's .mkv, Record3D's .r3d, .npz,
     /// or one depth image (.png) with its colour beside it (depth_1.png: color_1.png, rgb_1.png or .jpg).
@@ -121,6 +144,8 @@ pub(crate) struct RunArgs {
     pub(crate) out: PathBuf,
     #[command(flatten)]
     pub(crate) body: BodyArgs,
+    #[command(flatten)]
+    pub(crate) color: ColorArgs,
     /// Stop after so many frames.
     #[arg(long, value_name = "N")]
     pub(crate) frames: Option<usize>,
@@ -163,6 +188,8 @@ pub(crate) struct TrackArgs {
     pub(crate) recording: RecordingArgs,
     #[command(flatten)]
     pub(crate) body: BodyArgs,
+    #[command(flatten)]
+    pub(crate) color: ColorArgs,
     /// Rough start: {"root_position": [x, y, z], "facing_yaw_deg": d} in the camera frame.
     #[arg(long, value_name = "JSON")]
     pub(crate) init: Option<PathBuf>,

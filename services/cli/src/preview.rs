@@ -42,7 +42,10 @@ impl Preview {
         let choices = input::choices(&args.garments, &args.given())?;
         let mut source = args.recording.open(&args.input)?;
         let template = input::template(&args.body)?;
-        let mirror = Mirror::new(template, source.calibration(), choices);
+        let mut mirror = Mirror::new(template, source.calibration(), choices);
+        if let Some(landmarker) = args.color.landmarker()? {
+            mirror = mirror.with_landmarker(landmarker);
+        }
         let most = args.frames.unwrap_or(usize::MAX);
         let is_still = source.len().map(|n| n.min(most)) == Some(1);
         let still = if is_still { source.next_frame()? } else { None };

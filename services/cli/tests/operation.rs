@@ -116,6 +116,10 @@ fn a_box_refuses_files_that_it_cannot_use() {
         ("bus.config", vec![format!("bus.config={no}")]),
         ("bus.config", vec![format!("bus.config={}", json.display())]),
         ("tracking.body", vec![format!("tracking.body={no}")]),
+        (
+            "tracking.color_model",
+            vec![format!("tracking.color_model={no}")],
+        ),
         ("cloth.garments", vec![format!("cloth.garments={no}")]),
         (
             "cloth.garments_body",

@@ -5,14 +5,15 @@ use std::sync::{Arc, OnceLock};
 use std::time::Instant;
 use tryon_body::{BodyShape, Template, embedded, import};
 use tryon_formats::MeshFrame;
-use tryon_geometry::camera::{Calibration, Intrinsics};
+use tryon_geometry::camera::{Calibration, Intrinsics, RgbdFrame};
 use tryon_kit::frames::{Exposure, stage};
 use tryon_kit::telemetry::record_skipped;
+use tryon_landmarks::Landmarker;
 use tryon_proto::convert::{body, geometry};
 use tryon_proto::v1::{self, DegradedReason, TrackingStatus};
 use tryon_tracking::{
-    KnownBody, LostReason, Status, TrackerConfig, TrackerModel, TrackerState, Workspace,
-    adapt_surface, follow,
+    BackgroundEye, KnownBody, LostReason, Status, TrackerConfig, TrackerModel, TrackerState,
+    Workspace, adapt_surface, follow,
 };
 
 /// Configured template: an SMPL-layout npz, or the embedded body for an empty path.
@@ -30,19 +31,28 @@ pub(crate) fn load_template(path: &Path) -> Result<Arc<Template>, String> {
 /// Tracker model of the configured template, made once and beside the start of the service: it takes as long as several
 /// frames.
 #[derive(Clone)]
-pub(crate) struct PreparedModel(Arc<OnceLock<TrackerModel>>, Arc<Template>);
+pub(crate) struct PreparedModel {
+    made: Arc<OnceLock<TrackerModel>>,
+    template: Arc<Template>,
+    /// Networks of the eye for colour.
+    landmarker: Option<Landmarker>,
+}
 
 impl PreparedModel {
     /// A model that is not made yet.
-    pub(crate) fn new(template: Arc<Template>) -> Self {
-        Self(Arc::default(), template)
+    pub(crate) fn new(template: Arc<Template>, landmarker: Option<Landmarker>) -> Self {
+        Self {
+            made: Arc::default(),
+            template,
+            landmarker,
+        }
     }
 
     /// Makes it, unless that has been done.
     pub(crate) fn make(&self) -> &TrackerModel {
-        self.0.get_or_init(|| {
+        self.made.get_or_init(|| {
             let any = Calibration::registered(Intrinsics::KINECT_V1);
-            TrackerModel::new(self.1.clone(), any, TrackerConfig::default())
+            TrackerModel::new(self.template.clone(), any, TrackerConfig::default())
         })
     }
 
@@ -50,10 +60,19 @@ impl PreparedModel {
     fn for_camera(&self, calibration: Calibration) -> TrackerModel {
         self.make().with_calibration(calibration)
     }
+
+    /// An eye for colour beside a camera; `None` without the model.
+    fn eye(&self, calibration: &Calibration) -> Option<BackgroundEye> {
+        let landmarker = self.landmarker.clone()?;
+        let eye = BackgroundEye::start(landmarker, calibration.clone());
+        eye.inspect_err(|why| tracing::warn!(%why, "no thread for the eye for colour: depth alone"))
+            .ok()
+    }
 }
 
 /// One session's tracker for one calibration.
 pub(crate) struct Engine {
+    eye: Option<BackgroundEye>,
     model: TrackerModel,
     state: TrackerState,
     work: Workspace,
@@ -81,12 +100,14 @@ impl Engine {
         epoch: u64,
         counts: SessionCounts,
     ) -> Self {
+        let eye = prepared.eye(&calibration);
         let model = prepared.for_camera(calibration.as_ref().clone());
         let mut state = TrackerState::new(&model);
         state.subject = counts.subject;
         let (shape, wire_shape) = (BodyShape::default(), v1::BodyShape::default());
         let work = Workspace::default();
         Self {
+            eye,
             model,
             state,
             work,
@@ -140,9 +161,25 @@ impl Engine {
         }
     }
 
+    /// Tells the tracker what the eye for colour saw a moment ago, and shows it this frame.
+    fn look(&mut self, frame: &RgbdFrame) {
+        match self.eye.as_mut().map(|eye| eye.exchange(frame)) {
+            Some(Ok(Some(sighting))) => {
+                metrics::counter!("tryon_tracking_sightings").increment(1);
+                self.state.see(sighting);
+            }
+            Some(Err(why)) => {
+                tracing::warn!(%why, "the eye for colour is closed: depth alone");
+                self.eye = None;
+            }
+            Some(Ok(None)) | None => {}
+        }
+    }
+
     /// Tracks one exposure; the wire form of the state. [`Self::adapt`] is to follow.
     pub(crate) fn step(&mut self, e: &Exposure) -> v1::BodyState {
         let start = Instant::now();
+        self.look(&e.rgbd);
         let report = follow(&self.model, &mut self.state, &e.rgbd, &mut self.work);
         let mut stages = e.stages.clone();
         let mut state = v1::BodyState {

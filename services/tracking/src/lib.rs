@@ -11,6 +11,7 @@ use std::sync::Arc;
 use tryon_body::Template;
 use tryon_kit::config::Config;
 use tryon_kit::server::{self, Context, Running, Service, StartError};
+use tryon_landmarks::Landmarker;
 use tryon_proto::v1::tracking_service_server::{SERVICE_NAME, TrackingServiceServer};
 
 /// Largest request, bytes: a known body of the largest template takes 132 kB.
@@ -24,27 +25,45 @@ fn template(config: &Config) -> Result<Arc<Template>, StartError> {
     })
 }
 
+/// Loads the configured networks of the eye for colour; `None` for an empty path.
+fn landmarker(config: &Config) -> Result<Option<Landmarker>, StartError> {
+    let file = &config.tracking.color_model;
+    if file.as_os_str().is_empty() {
+        return Ok(None);
+    }
+    let opened = Landmarker::open(file).map_err(|why| StartError::Config {
+        key: "tracking.color_model".into(),
+        why: why.to_string(),
+    });
+    opened.map(Some)
+}
+
 /// Checks the files that `[tracking]` names.
 ///
 /// # Errors
-/// When the configured body cannot be read.
+/// When the configured body or colour model cannot be read.
 pub fn check(config: &Config) -> Result<(), StartError> {
-    template(config).map(drop)
+    template(config)?;
+    landmarker(config).map(drop)
 }
 
 /// Starts the service.
 ///
 /// # Errors
-/// When an address cannot be bound or the configured body cannot be read.
+/// When an address cannot be bound, or the configured body or colour model cannot be read.
 pub async fn start(config: &Config, ctx: Context) -> Result<Running, StartError> {
     let c = &config.tracking;
     let own = config.clone();
-    let template = ctx.pool.run(move || template(&own)).await;
-    let template = template.map_err(|e| StartError::Broken {
+    let read = move || -> Result<_, StartError> { Ok((template(&own)?, landmarker(&own)?)) };
+    let read = ctx.pool.run(read).await;
+    let (template, landmarker) = read.map_err(|e| StartError::Broken {
         service: "tracking",
         why: e.to_string(),
     })??;
-    let service = service::Tracking::new(c, &ctx, template);
+    if landmarker.is_none() {
+        tracing::info!("people are tracked by depth alone: tracking.color_model names no model");
+    }
+    let service = service::Tracking::new(c, &ctx, template, landmarker);
     service.prepare();
     let (mut routes, health) = server::routes(SERVICE_NAME)?;
     routes.add_service(

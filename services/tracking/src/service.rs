@@ -15,6 +15,7 @@ use tryon_kit::config::TrackingConfig;
 use tryon_kit::server::Context;
 use tryon_kit::sessions::{Opened, Sessions, brief, random_id};
 use tryon_kit::status::{exhausted, not_found, unavailable};
+use tryon_landmarks::Landmarker;
 use tryon_proto::convert::{body, request};
 use tryon_proto::v1::tracking_service_server::TrackingService;
 use tryon_proto::v1::*;
@@ -31,12 +32,17 @@ pub(crate) struct Tracking {
 }
 
 impl Tracking {
-    pub(crate) fn new(config: &TrackingConfig, ctx: &Context, template: Arc<Template>) -> Self {
+    pub(crate) fn new(
+        config: &TrackingConfig,
+        ctx: &Context,
+        template: Arc<Template>,
+        landmarker: Option<Landmarker>,
+    ) -> Self {
         Self {
             sessions: Sessions::new(config.max_sessions),
             ctx: ctx.clone(),
             wire_template: body::template_to_wire(&template),
-            model: PreparedModel::new(template.clone()),
+            model: PreparedModel::new(template.clone(), landmarker),
             template,
             idle: Duration::from_secs(config.idle_s),
         }

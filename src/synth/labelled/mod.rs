@@ -46,9 +46,10 @@ pub struct LabelledFrame {
     pub labels: Vec<u8>,
     /// Unit direction against gravity, camera frame.
     pub up: V3,
-    /// Posed joints, camera frame, metres.
+    /// Posed joints, camera frame, metres; none where nobody is.
     pub joints: Vec<P3d>,
-    /// Turn of the torso about gravity from facing the camera to the subject's left, radians; `None` for one that lies.
+    /// Turn of the torso about gravity from facing the camera to the subject's left, radians; `None` for one that lies and
+    /// for nobody.
     pub yaw: Option<f64>,
 }
 
@@ -122,7 +123,15 @@ impl LabelledFrames {
             joints: &joints,
             view: &view,
         };
-        let surroundings = Surroundings::draw(&self.settings, &person, rng);
+        let is_deserted = rng.random_bool(self.settings.deserted);
+        let surroundings = if is_deserted {
+            Surroundings::draw_alone(&self.settings, &person, rng)
+        } else {
+            Surroundings::draw(&self.settings, &person, rng)
+        };
+        if is_deserted {
+            joints.clear();
+        }
         joints.iter_mut().for_each(|j| *j = to_camera.point(j));
         let rotation = to_camera.iso().cast::<f32>();
         let place = drop + place.cast::<f32>();
@@ -180,7 +189,11 @@ impl LabelledFrames {
         };
         let pinhole = View::Perspective { camera, near: NEAR };
         let mut buffer = VisibilityBuffer::default();
-        let faces = self.template.mesh().faces();
+        let is_deserted = scene.joints.is_empty();
+        let faces = match self.template.mesh().faces() {
+            _ if is_deserted => &[],
+            faces => faces,
+        };
         rasterise_with(options, &pinhole, scene.vertices, faces, &mut buffer);
         let owners = scene.surroundings.overlay(view, &mut buffer.depth);
         let mut image = view.noise.apply(&camera, &buffer.depth, rng.random(), 0);
@@ -197,7 +210,8 @@ impl LabelledFrames {
         refine(&mut cloud, &image, &mut cells);
         let mut labels: Vec<u8> = cells.iter().map(|c| label(&cloud, *c)).collect();
         drop_strays(&cloud, &mut cells, &mut labels);
-        let own = labels.iter().filter(|l| **l < NOT_PERSON).count();
+        let is_own = |l: &&u8| is_deserted || **l < NOT_PERSON;
+        let own = labels.iter().filter(is_own).count();
         (own >= self.settings.least_cells).then_some((cloud, cells, labels))
     }
 
@@ -282,7 +296,7 @@ impl LabelledFrames {
     }
 }
 
-/// A posed person before a camera, camera frame, metres.
+/// A posed person before a camera, camera frame, metres; without joints nobody, things alone.
 struct PersonScene<'a> {
     view: &'a Viewpoint,
     vertices: &'a [P3],

@@ -79,6 +79,8 @@ settings! {
         pub joined: f64 = 0.6,
         /// Distance from the person's axis within which it does (m).
         pub joined_reach: [f32; 2] = [0.3, 0.9],
+        /// Share of frames that show things and nobody.
+        pub deserted: f64 = 0.08,
         /// Error of the direction of gravity, where it isn't known from a floor (degrees, standard deviation).
         pub gravity_error: f32 = 4.0,
     }

@@ -61,10 +61,36 @@ impl Surroundings {
                 out.reach = rng.random_range(near..far);
             }
         }
-        let to_camera = &person.view.world_from_camera;
-        out.worn = out.worn.seen_from(to_camera);
-        out.others = out.others.seen_from(to_camera);
-        out
+        out.seen_from(person.view)
+    }
+
+    /// Random things where a person would be: what segmentation takes for a person in an empty shop.
+    pub(super) fn draw_alone(
+        settings: &LabelledSettings,
+        person: &PosedPerson<'_>,
+        rng: &mut Pcg64Mcg,
+    ) -> Self {
+        let [near, far] = settings.joined_reach;
+        let mut out = Self {
+            reach: rng.random_range(near..far),
+            ..Self::default()
+        };
+        let kind = Piece::ALL[rng.random_range(0..Piece::ALL.len())];
+        let [x, z] = person.place();
+        let turn = rng.random_range(0.0..TAU);
+        out.others.append(&kind.surface().placed([x, 0.0, z], turn));
+        if rng.random_bool(0.5) {
+            out.others.append(&person.thing(settings, rng));
+        }
+        out.seen_from(person.view)
+    }
+
+    /// The same things in the camera's frame.
+    fn seen_from(mut self, view: &Viewpoint) -> Self {
+        let to_camera = &view.world_from_camera;
+        self.worn = self.worn.seen_from(to_camera);
+        self.others = self.others.seen_from(to_camera);
+        self
     }
 
     /// Draws the things over the person's depth image and tells whose each pixel is.

@@ -5,8 +5,8 @@ use super::standing::planted;
 use super::terms::FitTerms;
 use crate::model::{Limb, TrackerModel};
 use crate::registration::residual::{
-    ClearanceResidual, EdgeResidual, FloorPlane, FloorResidual, HandResidual, LimbMotion,
-    PointTerm, Residual, RestPoseResidual, SurfaceMetric, SurfaceResidual,
+    ClearanceResidual, EdgeResidual, FloorPlane, FloorResidual, HandResidual, JointResidual,
+    LimbMotion, PointTerm, Residual, RestPoseResidual, SurfaceMetric, SurfaceResidual,
 };
 use crate::registration::{
     Dof, NormalEquations, PairingConfig, PairingStats, ROOT_UNKNOWNS, linearise, pair_edges,
@@ -119,10 +119,19 @@ pub(crate) fn assemble(
     let sums = for_each_point(context, scratch, sigma, point_to_point, |term| {
         equations.add_point(term, &centre);
     });
+    let readings = scratch.residuals().max(1) as f64;
+    let seen = JointResidual {
+        joints: &scratch.bones.joints,
+        targets: &scratch.targets,
+        uncertainty: model.config.fit.seen_joints.uncertainty,
+        sigma: model.config.fit.seen_joints.sigma,
+        weight: model.config.fit.seen_joints.weight * readings,
+    };
+    seen.for_each(|term| equations.add_point(term, &centre));
     let skeleton = model.template.skeleton();
     linearise(skeleton, &scratch.bones, pose, &centre, &mut scratch.dofs);
     equations.assemble(&model.parents, &scratch.dofs);
-    let scale = 1.0 / scratch.residuals().max(1) as f64;
+    let scale = 1.0 / readings;
     equations.hessian *= scale;
     equations.gradient *= scale;
     add_priors(context, pose, scratch, &mut equations);

@@ -2,6 +2,7 @@
 
 use super::terms::FitTerms;
 use crate::model::{PersonalBody, TrackerModel};
+use crate::registration::residual::JointTarget;
 use crate::registration::{
     Dof, EdgePairs, ModelPoints, NormalEquations, Observation, Pair, PairingScratch, ROOT_UNKNOWNS,
 };
@@ -22,6 +23,8 @@ pub(crate) struct FitContext<'a> {
 pub(crate) struct FitScratch {
     /// Residuals and weights, until set anew.
     pub terms: FitTerms,
+    /// Places that joints are pulled to.
+    pub targets: Vec<JointTarget>,
     /// Bones of the last pose that was paired.
     pub bones: BoneTransforms,
     /// Samples at that pose, camera frame, metres.
@@ -42,6 +45,7 @@ impl Default for FitScratch {
     fn default() -> Self {
         Self {
             terms: FitTerms::start(&FitSettings::default()),
+            targets: Vec::new(),
             bones: BoneTransforms::default(),
             positions: Vec::new(),
             normals: Vec::new(),
@@ -65,6 +69,18 @@ impl FitScratch {
         let before = std::mem::replace(&mut self.terms, terms);
         let result = work(self);
         self.terms = before;
+        result
+    }
+
+    /// Runs `work` with joints pulled to `targets`.
+    pub(crate) fn with_targets<T>(
+        &mut self,
+        targets: Vec<JointTarget>,
+        work: impl FnOnce(&mut Self) -> T,
+    ) -> T {
+        let before = std::mem::replace(&mut self.targets, targets);
+        let result = work(self);
+        self.targets = before;
         result
     }
 

@@ -178,6 +178,8 @@ impl Repair<'_> {
         let settings = &self.context.model.config.recover.repair;
         let limbs = self.proposals.limbs_of(&self.context, self.pose, scratch);
         let mut out: Vec<Pose> = limbs.into_iter().collect();
+        scratch.draw(&self.context, self.pose);
+        out.extend(self.proposals.pulled(&self.context, self.pose, scratch));
         if self.agreement.wrong() > settings.body_wrong || self.proposals.faces_away(self.pose) {
             out.extend(self.proposals.poses(&self.context, scratch));
         }

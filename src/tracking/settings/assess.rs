@@ -19,6 +19,8 @@ settings! {
         pub belief: BeliefSettings = BeliefSettings::default(),
         /// Facing as the pose does, or the opposite.
         pub facing: FacingSettings = FacingSettings::default(),
+        /// Sightings in colour.
+        pub sighting: SightingSettings = SightingSettings::default(),
         /// Seated or standing.
         pub seat: SeatSettings = SeatSettings::default(),
     }
@@ -92,6 +94,20 @@ settings! {
         /// Factor on the cost of a reversed pose up to which the one that faces as the body parts do replaces it: front and
         /// back fit nearly alike. Larger trusts the body parts above the fit.
         pub dearer: f64 = 2.0,
+    }
+
+    /// Settings of sightings in colour.
+    pub struct SightingSettings {
+        /// Standard deviation of the yaw, radians: errors on `uva_turn` are 5° in the median and 30° at most. Smaller turns a
+        /// body to a shoulder blade.
+        pub yaw_deviation: f32 = 0.2,
+        /// Belief that is left for each eighth of a turn: who is seen may be somebody else.
+        pub least: f32 = 0.008,
+        /// Age up to which a sighting counts, seconds: a trunk turns by 30° in it. Smaller drops what a busy machine saw.
+        pub oldest: f64 = 0.3,
+        /// Level distance of its trunk from the middle of the subject's readings up to which it is of the subject, metres.
+        /// Larger hears of who stands beside.
+        pub apart: f32 = 0.4,
     }
 
     /// Settings of the seat.

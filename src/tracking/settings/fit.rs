@@ -71,12 +71,26 @@ settings! {
         pub start_edges: f64 = 0.3,
         /// Factor on the rest-pose prior from a rough start. Smaller lets limbs without readings turn.
         pub start_rest: f64 = 1.0,
+        /// Joints where an eye sees them.
+        pub seen_joints: SeenJointSettings = SeenJointSettings::default(),
         /// Prediction from the last poses.
         pub prediction: PredictionSettings = PredictionSettings::default(),
         /// Hidden feet on the floor.
         pub standing: StandingSettings = StandingSettings::default(),
         /// Hands beyond sleeves without return.
         pub hands: HandAssignmentSettings = HandAssignmentSettings::default(),
+    }
+
+    /// Settings of the pull on joints to where an eye sees them.
+    pub struct SeenJointSettings {
+        /// Weight of a sure joint, per point: a hand in view has 10⁻³.
+        pub weight: f64 = 3e-3,
+        /// Error of the eye, metres: joints nearer than that stay where the readings hold them.
+        pub uncertainty: f64 = 0.05,
+        /// Width of the robust kernel, metres. Larger follows proposals of another limb.
+        pub sigma: f64 = 0.3,
+        /// Iterations of a fit with the pull.
+        pub iterations: usize = 6,
     }
 
     /// Settings of the prediction.

@@ -13,9 +13,11 @@ mod tracker;
 
 pub use assess::{
     AssessSettings, BeliefSettings, ConfidenceSettings, FacingSettings, SeatSettings,
+    SightingSettings,
 };
 pub use fit::{
-    FitSettings, HandAssignmentSettings, PredictionSettings, Schedule, StandingSettings,
+    FitSettings, HandAssignmentSettings, PredictionSettings, Schedule, SeenJointSettings,
+    StandingSettings,
 };
 pub use model::{ModelSettings, StillCameraSettings};
 pub use recover::{HiddenLimbSettings, RecoverSettings, RepairSettings};

@@ -3,11 +3,11 @@
 use super::facing::{Facing, facing};
 use super::joint_proposals::JointProposals;
 use super::proposed_pose::ProposedPoses;
-use crate::fit::{FitContext, FitScratch, evaluate};
+use crate::fit::{FitContext, FitScratch, evaluate, fit_pose};
 use crate::model::{PartKind, TrackerModel};
 use crate::registration::Observation;
 use crate::segment::part_network::{PersonCells, PersonParts};
-use crate::settings::ProposalSettings;
+use crate::settings::{ProposalSettings, Schedule};
 use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
 use std::f64::consts::PI;
 use tryon_body::parts::{BodyPart, BodySide};
@@ -37,15 +37,14 @@ pub(crate) fn person_cells<'a>(
 }
 
 impl BodyProposals {
-    /// Classifies the subject's cells. `up` is the unit direction against gravity, camera frame.
+    /// Proposals of what was seen of the subject. `up` is the unit direction against gravity, camera frame.
     pub(crate) fn new(
         model: &TrackerModel,
         observation: &Observation<'_>,
         up: &Vector3<f64>,
-        parts: &mut PersonParts,
+        parts: &PersonParts,
     ) -> Self {
         let person = person_cells(observation, up);
-        model.part_network.infer(&person, parts);
         let settings = &model.config.start.proposals;
         let joints = JointProposals::new(&model.part_classes, &parts.joints, settings);
         Self {
@@ -133,6 +132,28 @@ impl BodyProposals {
             .is_some_and(|f| f.confidence > self.settings.sure);
         let flipped = (!is_sure).then_some((&self.flipped, PI));
         std::iter::once((&self.joints, 0.0)).chain(flipped)
+    }
+
+    /// A pose after a fit with its joints pulled to their proposals; `None` where it faces away from them. `scratch` with the
+    /// pose's bones.
+    pub(crate) fn pulled(
+        &self,
+        context: &FitContext<'_>,
+        pose: &Pose,
+        scratch: &mut FitScratch,
+    ) -> Option<Pose> {
+        let targets = self.joints.targets(context.model, scratch);
+        if targets.is_empty() || self.faces_away(pose) {
+            return None;
+        }
+        let fit = &context.model.config.fit;
+        let schedule = Schedule {
+            iterations: fit.seen_joints.iterations,
+            ..fit.track
+        };
+        let mut pulled = pose.clone();
+        scratch.with_targets(targets, |s| fit_pose(context, &mut pulled, &schedule, s));
+        Some(pulled)
     }
 
     /// `pose` with each limb moved to its proposed place where that costs less; `None` where it nowhere does.

@@ -1,6 +1,8 @@
 //! Proposed places of a template's joints, from the part network.
 
-use crate::model::{NECK_CLASS, PartClasses, PartKind};
+use crate::fit::FitScratch;
+use crate::model::{NECK_CLASS, PART_CLASSES, PartClasses, PartKind, TrackerModel};
+use crate::registration::residual::JointTarget;
 use crate::segment::part_network::JointProposal;
 use crate::settings::ProposalSettings;
 use tryon_body::parts::BodySide;
@@ -61,6 +63,28 @@ impl JointProposals {
         }
         anchors.sort_by(|a, b| a.class.cmp(&b.class).then(b.weight.total_cmp(&a.weight)));
         Self { anchors }
+    }
+    /// For each class the heavy proposal nearest to its anchor among the scratch's bones.
+    pub(crate) fn targets(&self, model: &TrackerModel, scratch: &FitScratch) -> Vec<JointTarget> {
+        let settings = &model.config.start.proposals;
+        let joints = &scratch.bones.joints;
+        let of_class = |class: u8| {
+            let [a, b] = model.part_classes.anchor(class)?;
+            let now = model.part_classes.anchor_of(class, joints)?;
+            let heavy = self.of_class(class).filter(|p| p.1 > settings.heavy);
+            let (position, weight) = heavy
+                .map(|(p, w)| (p.cast::<f64>(), f64::from(w)))
+                .min_by(|x, y| (x.0 - now).norm().total_cmp(&(y.0 - now).norm()))?;
+            // The place of a joint is carried by the bone above it.
+            let bone = if a == b { model.parents[a]? } else { a };
+            Some(JointTarget {
+                joints: [a, b],
+                bone,
+                position,
+                weight,
+            })
+        };
+        (0..PART_CLASSES as u8).filter_map(of_class).collect()
     }
     /// Places of a class's anchor, heaviest first.
     pub fn of_class(&self, class: u8) -> impl Iterator<Item = (P3, f32)> + '_ {

@@ -150,6 +150,9 @@ pub(crate) fn run(args: &RunArgs) -> Result<ExitCode> {
     let template = input::template(&args.body)?;
     input::create_dir(&args.out)?;
     let mut mirror = Mirror::new(template, source.calibration(), choices);
+    if let Some(landmarker) = args.color.landmarker()? {
+        mirror = mirror.with_landmarker(landmarker);
+    }
     mirror.set_off_person_interval(0.0);
     let report = with_threads(args.threads, || dress_all(args, source, mirror))??;
     write(&args.out.join("report.json"), &report)?;

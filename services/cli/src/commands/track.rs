@@ -15,7 +15,8 @@ use tryon::formats::obj::write_obj;
 use tryon::geometry::camera::{ColorImage, RgbdFrame};
 use tryon::geometry::par::with_threads;
 use tryon::tracking::{
-    Status, StepReport, TrackerConfig, TrackerModel, TrackerState, Workspace, step,
+    COLOR_INTERVAL, ColorEye, Status, StepReport, TrackerConfig, TrackerModel, TrackerState,
+    Workspace, step,
 };
 
 /// Runs the command.
@@ -62,6 +63,9 @@ fn track_all(
 ) -> Result<()> {
     let bar = input::progress(source.len().map(|n| n as u64), "tracking");
     let mut workspace = Workspace::default();
+    let calibration = model.calibration();
+    let landmarker = args.color.landmarker()?;
+    let mut eye = landmarker.map(|l| ColorEye::new(l, calibration.clone()));
     let mut live = 0u64;
     let mut index = 0usize;
     let mut bad = 0usize;
@@ -82,6 +86,11 @@ fn track_all(
                 continue;
             }
         };
+        if let Some(eye) = eye.as_mut().filter(|_| index as u64 % COLOR_INTERVAL == 0)
+            && let Some(sighting) = eye.look(&frame).with_context(|| format!("frame {index}"))?
+        {
+            state.see(sighting);
+        }
         let started = std::time::Instant::now();
         let report = step(model, &mut state, &frame, &mut workspace)
             .with_context(|| format!("frame {index}"))?;

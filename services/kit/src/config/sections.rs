@@ -234,6 +234,8 @@ settings! {
         pub admin: SocketAddr = local(9102),
         /// SMPL-layout npz to use as template; empty means the embedded body.
         pub body: PathBuf = PathBuf::new(),
+        /// Model of `tools/landmarks/convert`, by which people are tracked in colour as well; empty means by depth alone.
+        pub color_model: PathBuf = PathBuf::new(),
         /// Most sessions at a time.
         pub max_sessions: usize = 4,
         /// Seconds after which a session that nobody reads is closed.

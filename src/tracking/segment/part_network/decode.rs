@@ -3,10 +3,11 @@
 use super::class_map::ClassMap;
 use super::crop::{CROP_SIDE, PersonCells, PersonCrop};
 use super::network::{CLASSES, MAP_CELLS, MAP_SIDE, NetworkOutput};
+use serde::{Deserialize, Serialize};
 use tryon_geometry::math::P3;
 
 /// A proposed joint.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct JointProposal {
     /// Class whose joint it is.
     pub class: u8,
@@ -63,24 +64,24 @@ impl NetworkOutput {
     }
 
     /// Proposed joints: at most two peaks a class, the likelier first, classes ascending. Nothing is proposed where nothing is
-    /// read: a joint's depth is relative to its reading.
+    /// read, or before what is read.
     pub(super) fn proposals(
         &self,
         crop: &PersonCrop,
         person: &PersonCells<'_>,
         picture: &[f32],
     ) -> Vec<JointProposal> {
-        let is_read = read_cells(picture);
+        let nearest = nearest_readings(picture);
         let mut out = Vec::new();
         for class in 0..CLASSES {
             let own = class * MAP_CELLS..(class + 1) * MAP_CELLS;
             let (heat, depth) = (&self.heat[own.clone()], &self.depth[own]);
             let mut peaks = peaks(heat);
-            peaks.retain(|p| is_read[p.0]);
+            peaks.retain(|p| nearest[p.0].is_finite());
             peaks.truncate(PEAKS);
             let most = peaks.first().map_or(0.0, |p| p.1);
             for (k, weight) in peaks.into_iter().filter(|p| p.1 >= LEAST_PEAK * most) {
-                let at = place(heat, depth, k);
+                let at = place(heat, depth, &nearest, k);
                 let position = crop.point(person.cloud, at);
                 out.extend(position.map(|position| JointProposal {
                     class: class as u8,
@@ -97,14 +98,18 @@ fn probability(logit: f32) -> f32 {
     1.0 / (1.0 + (-logit).exp())
 }
 
-/// True for each cell of a map in which the person is read.
-fn read_cells(picture: &[f32]) -> Vec<bool> {
+/// Nearest reading of the person in each cell of a map, units of the window's side; infinite without one.
+fn nearest_readings(picture: &[f32]) -> Vec<f32> {
     let pixels = CROP_SIDE * CROP_SIDE;
-    let mut out = vec![false; MAP_CELLS];
-    for (i, read) in picture[pixels..2 * pixels].iter().enumerate() {
+    let mut out = vec![f32::INFINITY; MAP_CELLS];
+    let (depth, is_read) = picture.split_at(pixels);
+    for (i, (d, read)) in depth.iter().zip(is_read).enumerate() {
         let (u, v) = (i % CROP_SIDE, i / CROP_SIDE);
         let step = CROP_SIDE / MAP_SIDE;
-        out[v / step * MAP_SIDE + u / step] |= *read > 0.0;
+        let nearest = &mut out[v / step * MAP_SIDE + u / step];
+        if *read > 0.0 {
+            *nearest = nearest.min(*d);
+        }
     }
     out
 }
@@ -148,20 +153,24 @@ fn peaks(heat: &[f32]) -> Vec<(usize, f32)> {
     out
 }
 
-/// Window coordinates of a peak: the mean about it, weighted by probability.
-fn place(heat: &[f32], depth: &[f32], peak: usize) -> [f32; 3] {
+/// Window coordinates of a peak: the mean about it, weighted by probability; the depth's over what is read, behind it.
+fn place(heat: &[f32], depth: &[f32], nearest: &[f32], peak: usize) -> [f32; 3] {
+    let middle = |i: usize| (i as f32 + 0.5) / MAP_SIDE as f32;
     let mut sum = [0.0; 3];
-    let mut total = 0.0;
+    let mut totals = [0.0; 3];
     for k in about(peak, PEAK_REACH) {
         let w = probability(heat[k]);
-        let middle = |i: usize| (i as f32 + 0.5) / MAP_SIDE as f32;
-        for (s, x) in sum
-            .iter_mut()
-            .zip([middle(k % MAP_SIDE), middle(k / MAP_SIDE), depth[k]])
-        {
-            *s += w * x;
+        let is_read = nearest[k].is_finite();
+        let (away, of_depth) = if is_read {
+            (depth[k].max(nearest[k]), w)
+        } else {
+            (0.0, 0.0)
+        };
+        let values = [middle(k % MAP_SIDE), middle(k / MAP_SIDE), away];
+        for (i, (x, w)) in values.into_iter().zip([w, w, of_depth]).enumerate() {
+            sum[i] += w * x;
+            totals[i] += w;
         }
-        total += w;
     }
-    sum.map(|s| s / f32::max(total, f32::MIN_POSITIVE))
+    std::array::from_fn(|i| sum[i] / f32::max(totals[i], f32::MIN_POSITIVE))
 }

@@ -1,6 +1,7 @@
 //! Yaw of the person about gravity, as a belief in eight bins.
 
 use super::network::YAW_SECTORS;
+use std::f32::consts::TAU;
 
 /// Bins of yaw; the first is centred on a person who faces the camera, the others follow towards the subject's left.
 pub const YAW_BINS: usize = 8;
@@ -28,6 +29,32 @@ impl YawBelief {
         });
         Self { bins, cells }
     }
+
+    /// Belief about a measured yaw, radians, with this standard deviation, of a person of so many cells; `least` is left
+    /// for each bin, for a measurement of something else.
+    pub(crate) fn about(yaw: f32, deviation: f32, least: f32, cells: usize) -> Self {
+        let sharpness = deviation.powi(-2);
+        let weight = |k: usize| {
+            let off = TAU / YAW_BINS as f32 * k as f32 - yaw;
+            (sharpness * (off.cos() - 1.0)).exp()
+        };
+        let weights: [f32; YAW_BINS] = std::array::from_fn(weight);
+        let sum: f32 = weights.iter().sum();
+        let bins = weights.map(|w| least + (1.0 - YAW_BINS as f32 * least) * w / sum);
+        Self { bins, cells }
+    }
+
+    /// Belief from this and from another source that knows nothing of it.
+    pub(crate) fn and(&self, other: &Self) -> Self {
+        let products: [f32; YAW_BINS] = std::array::from_fn(|k| self.bins[k] * other.bins[k]);
+        let sum: f32 = products.iter().sum();
+        if sum > 0.0 {
+            let bins = products.map(|p| p / sum);
+            Self { bins, ..*self }
+        } else {
+            *other
+        }
+    }
 }
 
 #[cfg(test)]
@@ -42,5 +69,21 @@ mod tests {
         assert!((belief.bins[4] - 0.5).abs() < 1e-6);
         assert!((belief.bins[7] - 0.25).abs() < 1e-6 && (belief.bins[0] - 0.25).abs() < 1e-6);
         assert!((belief.bins.iter().sum::<f32>() - 1.0).abs() < 1e-6);
+    }
+
+    #[test]
+    fn beliefs_from_two_sources_multiply_and_a_measurement_leaves_room_for_others() {
+        let about = |yaw: f32| YawBelief::about(yaw, 0.2, 0.01, 50);
+        let belief = about(TAU / 4.0);
+        assert!(belief.bins[2] > 0.85 && belief.bins[6] >= 0.01);
+        assert!((belief.bins.iter().sum::<f32>() - 1.0).abs() < 1e-5);
+        let both = belief.and(&about(-TAU / 4.0));
+        assert!((both.bins[2] - both.bins[6]).abs() < 1e-5 && both.cells == 50);
+        let mut even = YawBelief { cells: 9, ..belief };
+        even.bins = [1.0 / YAW_BINS as f32; YAW_BINS];
+        let joined = even.and(&belief);
+        let off = (0..YAW_BINS).map(|k| (joined.bins[k] - belief.bins[k]).abs());
+        assert!(off.fold(0.0, f32::max) < 1e-6 && joined.cells == 9);
+        assert_eq!(YawBelief::default().and(&belief), belief);
     }
 }
