@@ -1,27 +1,16 @@
 //! Change detection: reuses the last report while the depth image differs from a reference only by sensor noise.
 
+use super::block_readings::BlockReadings;
 use super::report::{StepReport, TrackingStagesMs};
 use crate::settings::ChangeSettings;
 use serde::{Deserialize, Serialize};
 use tryon_geometry::camera::DepthImage;
 use tryon_geometry::spatial::OrganisedCloud;
 
-/// Samples along a side of a block.
-const BLOCK: usize = 8;
-/// Samples of a block.
-const AREA: usize = BLOCK * BLOCK;
-
 /// Blocks of a depth image and the report of that frame.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(super) struct DepthReference {
-    /// Pixels between samples.
-    step: u32,
-    /// Columns of blocks in the image.
-    columns: u32,
-    /// Row-major blocks that are compared.
-    blocks: Vec<u32>,
-    /// Readings, millimetres, [`AREA`] of each block in turn.
-    readings: Vec<u16>,
+    blocks: BlockReadings,
     /// Frames that reused the report.
     #[serde(rename = "kept")]
     reused: u32,
@@ -31,8 +20,7 @@ pub(super) struct DepthReference {
 impl DepthReference {
     /// Reference of the whole image, at every `step`-th pixel.
     pub(super) fn of_image(image: &DepthImage, step: u32, report: &StepReport) -> Self {
-        let [columns, rows] = size(image, step);
-        Self::new(image, step, columns, (0..columns * rows).collect(), report)
+        Self::new(BlockReadings::of_image(image, step), report)
     }
 
     /// Reference of the blocks that hold any of a grid's `cells`, and of their neighbours.
@@ -42,47 +30,17 @@ impl DepthReference {
         cells: &[u32],
         report: &StepReport,
     ) -> Self {
-        let (step, grid_columns) = (grid.stride(), grid.size().0 as u32);
-        let [columns, rows] = size(image, step);
-        let mut counts = vec![false; (columns * rows) as usize];
-        for &cell in cells {
-            let (c, r) = (
-                cell % grid_columns / BLOCK as u32,
-                cell / grid_columns / BLOCK as u32,
-            );
-            for r in r.saturating_sub(1)..(r + 2).min(rows) {
-                for c in c.saturating_sub(1)..(c + 2).min(columns) {
-                    counts[(r * columns + c) as usize] = true;
-                }
-            }
-        }
-        let blocks = (0..columns * rows)
-            .filter(|b| counts[*b as usize])
-            .collect();
-        Self::new(image, step, columns, blocks, report)
+        Self::new(BlockReadings::about_cells(image, grid, cells), report)
     }
 
-    fn new(
-        image: &DepthImage,
-        step: u32,
-        columns: u32,
-        blocks: Vec<u32>,
-        report: &StepReport,
-    ) -> Self {
-        let mut readings = Vec::with_capacity(blocks.len() * AREA);
-        for &block in &blocks {
-            samples(image, step, columns, block, |d| readings.push(d));
-        }
+    fn new(blocks: BlockReadings, report: &StepReport) -> Self {
         // Times are of that frame alone, and no part of a state.
         let report = StepReport {
             stages_ms: TrackingStagesMs::default(),
             ..report.clone()
         };
         Self {
-            step,
-            columns,
             blocks,
-            readings,
             reused: 0,
             report,
         }
@@ -94,74 +52,18 @@ impl DepthReference {
         image: &DepthImage,
         settings: &ChangeSettings,
     ) -> Option<&StepReport> {
-        if self.reused >= settings.most_reused
-            || self.columns != size(image, self.step)[0]
-            || self.has_changed(image, settings)
-        {
+        if self.reused >= settings.most_reused || self.blocks.has_changed(image, settings) {
             return None;
         }
         self.reused += 1;
         Some(&self.report)
-    }
-
-    fn has_changed(&self, image: &DepthImage, settings: &ChangeSettings) -> bool {
-        let (mut sum, mut counted) = (0.0, 0);
-        for (&block, before) in self.blocks.iter().zip(self.readings.chunks_exact(AREA)) {
-            let (mut first, mut second, mut any, mut k) = (0i32, 0i32, false, 0);
-            samples(image, self.step, self.columns, block, |now| {
-                let was = before[k];
-                k += 1;
-                any |= (now | was) != 0;
-                let change = match (was, now) {
-                    (0, 0) => 0,
-                    (_, 0) => settings.most_change,
-                    (0, _) => -settings.most_change,
-                    _ => (i32::from(now) - i32::from(was))
-                        .clamp(-settings.most_change, settings.most_change),
-                };
-                first += change;
-                second += change * change;
-            });
-            if !any {
-                continue;
-            }
-            let mean = first as f32 / AREA as f32;
-            let variance = (second as f32 / AREA as f32 - mean * mean).max(0.0);
-            let share =
-                mean * mean / (variance / AREA as f32 + settings.dead_band * settings.dead_band);
-            if share > settings.changed[1] * settings.changed[1] {
-                return true;
-            }
-            sum += share;
-            counted += 1;
-        }
-        sum > settings.changed[0] * settings.changed[0] * counted as f32
-    }
-}
-
-/// Columns and rows of whole blocks.
-fn size(image: &DepthImage, step: u32) -> [u32; 2] {
-    let side = (step.max(1) * BLOCK as u32).max(1);
-    [image.width() / side, image.height() / side]
-}
-
-/// Visits the readings of one block, millimetres, at the middle of their cells.
-fn samples(image: &DepthImage, step: u32, columns: u32, block: u32, mut f: impl FnMut(u16)) {
-    let (step, width) = (step.max(1) as usize, image.width() as usize);
-    let (row, column) = (
-        (block / columns) as usize * BLOCK,
-        (block % columns) as usize * BLOCK,
-    );
-    for row in row..row + BLOCK {
-        let start = (row * step + step / 2) * width + column * step + step / 2;
-        let line = image.data().get(start..).unwrap_or_default();
-        line.iter().step_by(step).take(BLOCK).for_each(|d| f(*d));
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::block_readings::BLOCK;
     use crate::report::Skipped;
     use crate::status::Status;
     use rand::{Rng, SeedableRng};
@@ -214,7 +116,9 @@ mod tests {
     }
 
     fn has_changed(reference: &DepthReference, image: &DepthImage) -> bool {
-        reference.has_changed(image, &ChangeSettings::default())
+        reference
+            .blocks
+            .has_changed(image, &ChangeSettings::default())
     }
 
     #[test]
@@ -275,7 +179,11 @@ mod tests {
         let grid = OrganisedCloud::new(&camera, Some(2));
         let cell = 30 * (WIDTH / 2) + 36;
         let of_person = DepthReference::of_cells(&first, &grid, &[cell], &report());
-        assert_eq!(of_person.blocks.len(), 9, "a block and its neighbours");
+        assert_eq!(
+            of_person.blocks.blocks.len(),
+            9,
+            "a block and its neighbours"
+        );
         let mut elsewhere = first.clone();
         elsewhere.data_mut()[..2000].fill(0);
         assert!(

@@ -43,7 +43,7 @@
 //! - Sleeves without return: [`mod@fit::hand_assignment`].
 //! - Seated or standing: [`mod@assess::seat`].
 //! - Jitter: [`mod@fit::pose_filter`].
-//! - Unchanged frames: [`mod@change_detection`].
+//! - Unchanged frames: [`mod@change_detection`], by [`mod@block_readings`]. What never moved: [`mod@own_motion`].
 //! - Body in free space, readings left uncovered: [`mod@assess::agreement`].
 //! - Person or thing: [`mod@assess::person_evidence`]. Front or back: [`mod@assess::facing_belief`]. Both: [`mod@doubt`].
 //! - The eye for colour: [`mod@color_eye`], beside the frames: [`mod@background_eye`]; its sightings: [`mod@sighting`].
@@ -62,12 +62,14 @@
 mod adaptation;
 mod assess;
 mod background_eye;
+mod block_readings;
 mod change_detection;
 mod color_eye;
 mod doubt;
 mod fit;
 mod known_subject;
 mod model;
+mod own_motion;
 mod recover;
 pub mod registration;
 mod report;

@@ -8,7 +8,7 @@ use crate::fit::FitContext;
 use crate::model::TrackerModel;
 use crate::registration::Observation;
 use crate::segment::{PersonChoice, PersonPrior, PersonSearch, contour, find_person, find_planes};
-use tryon_geometry::camera::RgbdFrame;
+use tryon_geometry::camera::{DepthImage, RgbdFrame};
 use tryon_geometry::spatial::OrganisedCloud;
 
 /// Samples the depth image into `grid` and finds the subject; refines its cells and traces its outline.
@@ -46,6 +46,7 @@ pub(super) fn segment(
         PersonChoice::Near(prior)
     } else {
         state.refusals.age();
+        hold_things(model, state, &frame.depth);
         let is_recent = matches!(state.status, Status::Lost { .. })
             && state.pose_age <= settings.recall
             && state.belief.verdict == Verdict::Person;
@@ -64,6 +65,19 @@ pub(super) fn segment(
         contour(grid, &person.cells, settings, &mut workspace.contour);
     }
     person
+}
+
+/// Lets things that never moved wait, and forgets those that did.
+fn hold_things(model: &TrackerModel, state: &mut TrackerState, image: &DepthImage) {
+    let (steps, refusals) = (&model.config.step, &model.config.segment.refusals);
+    for thing in std::mem::take(&mut state.things) {
+        if thing.is_still(image, steps) {
+            state.refusals.hold(thing.candidate, refusals);
+            state.things.push(thing);
+        } else {
+            state.refusals.forget(&thing.candidate, refusals);
+        }
+    }
 }
 
 /// Draws the body of the last pose into the grid.

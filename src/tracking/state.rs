@@ -1,6 +1,7 @@
 //! State of a tracker from frame to frame.
 
 use super::change_detection::DepthReference;
+use super::own_motion::{StillSubject, StillThing};
 use super::status::{LostReason, Status};
 use crate::assess::{FacingBelief, PersonBelief, Seat};
 use crate::fit::{FootMemory, RecentPoses};
@@ -61,6 +62,12 @@ pub struct TrackerState {
     /// The subject is followed, but maybe nobody, or turned around: not live.
     #[serde(default)]
     pub(super) is_unsure: bool,
+    /// Watch over a subject that has not moved yet.
+    #[serde(default)]
+    pub(super) still_subject: Option<StillSubject>,
+    /// Subjects that never moved, and still stand there.
+    #[serde(default)]
+    pub(super) things: Vec<StillThing>,
     /// Person seen in colour since the last step.
     #[serde(default)]
     pub(super) sighting: Option<ColorSighting>,
@@ -131,6 +138,8 @@ impl TrackerState {
             refusals: Refusals::default(),
             belief: PersonBelief::default(),
             facing: None,
+            still_subject: None,
+            things: Vec::new(),
             sighting: None,
             is_unsure: false,
             centre: P3::origin(),
@@ -175,6 +184,7 @@ impl TrackerState {
             scene: self.scene.clone(),
             scene_age: self.scene_age,
             refusals: self.refusals.clone(),
+            things: self.things.clone(),
             frames: self.frames,
             subject: self.subject,
             ..fresh

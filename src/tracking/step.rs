@@ -1,7 +1,9 @@
 //! One frame (Algorithm 1): segment → track the subject → keep a reference for change detection → adapt the surface.
 
 use super::adaptation::adapt_surface;
+use super::block_readings::BlockReadings;
 use super::change_detection::DepthReference;
+use super::own_motion::{OwnMotion, StillSubject, StillThing};
 use super::report::{StepError, StepReport, Stopwatch};
 use super::segmentation::segment;
 use super::state::TrackerState;
@@ -14,7 +16,7 @@ use crate::registration::Observation;
 use crate::segment::{CandidateBox, PersonSearch};
 use crate::start::{person_cells, rolled_camera};
 use nalgebra::Vector3;
-use tryon_geometry::camera::{DepthImage, RgbdFrame};
+use tryon_geometry::camera::RgbdFrame;
 use tryon_geometry::spatial::OrganisedCloud;
 
 /// Tracks one frame. On success the state holds the newest pose and status. A frame without a usable subject keeps the
@@ -62,21 +64,56 @@ pub fn follow(
     let mut grid = cached.unwrap_or_else(|| OrganisedCloud::new(camera, stride));
     state.frames += 1;
     let person = segment(model, state, frame, &mut grid, workspace);
+    let seen = SegmentedFrame {
+        frame,
+        grid: &grid,
+        person: &person,
+    };
     let mut log = StepLog::new(state, &grid, &person, watch);
     let nobody = person.cells.len() < model.config.segment.least_cells;
     if nobody {
         lose(state, LostReason::NoPerson);
     } else {
+        seen.track(model, state, workspace, &mut log);
+    }
+    let mut report = log.report;
+    report.status = state.status;
+    report.pose_age = state.pose_age;
+    if model.config.skip_unchanged {
+        state.reference = seen.reference(model, state, &report);
+    }
+    workspace.grid = Some(grid);
+    Ok(report)
+}
+
+/// Frame with its grid and the person in it.
+struct SegmentedFrame<'a> {
+    frame: &'a RgbdFrame,
+    grid: &'a OrganisedCloud,
+    person: &'a PersonSearch,
+}
+
+impl SegmentedFrame<'_> {
+    /// Tracks the subject; remembers a candidate that was nobody.
+    fn track(
+        &self,
+        model: &TrackerModel,
+        state: &mut TrackerState,
+        workspace: &mut Workspace,
+        log: &mut StepLog,
+    ) {
+        let (frame, grid, person) = (self.frame, self.grid, self.person);
         let contour = std::mem::take(&mut workspace.contour);
-        let tree = model.point_tree(&grid, &person.cells);
+        let tree = model.point_tree(grid, &person.cells);
         let observation = Observation {
-            grid: &grid,
+            grid,
             cells: &person.cells,
             false_edges: &contour.false_edges,
             true_edges: &contour.true_edges,
             tree: tree.as_ref(),
         };
-        if !state.is_following() && !state.floor_known {
+        let is_new = !state.is_following();
+        if is_new && !state.floor_known {
             let scratch = &mut workspace.parts;
             state.world_from_camera = rolled_camera(model, &observation, scratch);
         }
@@ -87,14 +124,15 @@ pub fn follow(
         let subject = SubjectFrame {
             model,
             frame,
-            person: &person,
+            person,
             observation,
             up,
             sighting: sighting.filter(|s| s.is_of(&cells, frame.time_ns, settings)),
         };
-        match subject.track_known(state, workspace, &mut log) {
+        match subject.track_known(state, workspace, log) {
             Ok(()) => {
                 let is_tested = !state.is_unsure;
+                self.watch(model, state, is_new);
                 if let Some(candidate) = person.candidate.filter(|_| is_tested) {
                     let settings = &model.config.segment.refusals;
                     state.refusals.forget(&candidate, settings);
@@ -109,29 +147,36 @@ pub fn follow(
         }
         workspace.contour = contour;
     }
-    let mut report = log.report;
-    report.status = state.status;
-    report.pose_age = state.pose_age;
-    if model.config.skip_unchanged {
-        let segmented = SegmentedFrame {
-            depth: &frame.depth,
-            grid: &grid,
-            person: &person,
+
+    /// Watches a subject that hasn't moved yet; one that never does is a thing.
+    fn watch(&self, model: &TrackerModel, state: &mut TrackerState, is_new: bool) {
+        let settings = &model.config.step;
+        let (depth, time_ns) = (&self.frame.depth, self.frame.time_ns);
+        if is_new {
+            let cells = &self.person.cells;
+            let readings = BlockReadings::within_cells(depth, self.grid, cells);
+            state.still_subject = Some(StillSubject::new(readings, time_ns));
+            return;
+        }
+        let Some(mut subject) = state.still_subject.take() else {
+            return;
         };
-        state.reference = segmented.reference(model, state, &report);
+        match (
+            subject.watch(depth, time_ns, settings),
+            self.person.candidate,
+        ) {
+            (OwnMotion::Moved, _) => {}
+            (OwnMotion::Never, Some(candidate)) => {
+                state
+                    .things
+                    .truncate(settings.most_things.saturating_sub(1));
+                state.things.insert(0, StillThing::new(candidate, subject));
+                state.reset(model);
+            }
+            _ => state.still_subject = Some(subject),
+        }
     }
-    workspace.grid = Some(grid);
-    Ok(report)
-}
 
-/// Frame with its grid and the person in it.
-struct SegmentedFrame<'a> {
-    depth: &'a DepthImage,
-    grid: &'a OrganisedCloud,
-    person: &'a PersonSearch,
-}
-
-impl SegmentedFrame<'_> {
     /// Reference of later frames, which are skipped while nothing changes.
     fn reference(
         &self,
@@ -140,13 +185,14 @@ impl SegmentedFrame<'_> {
         report: &StepReport,
     ) -> Option<DepthReference> {
         let (grid, cells) = (self.grid, &self.person.cells);
+        let depth = &self.frame.depth;
         if cells.len() >= model.config.segment.least_cells {
             return is_at_rest(model, state)
-                .then(|| DepthReference::of_cells(self.depth, grid, cells, report));
+                .then(|| DepthReference::of_cells(depth, grid, cells, report));
         }
         // A waiting candidate is tried again though nothing changes.
         let step = model.config.step.empty_stride * grid.stride();
-        (self.person.rivals == 0).then(|| DepthReference::of_image(self.depth, step, report))
+        (self.person.rivals == 0).then(|| DepthReference::of_image(depth, step, report))
     }
 }
 
@@ -248,6 +294,7 @@ fn lose(state: &mut TrackerState, reason: LostReason) {
         state.status = Status::Lost { reason };
     }
     (state.bad_frames, state.disagreeing) = (0, 0);
+    state.still_subject = None;
     state.belief.lose();
     (state.facing, state.is_unsure) = (None, false);
 }
@@ -256,6 +303,7 @@ fn lose(state: &mut TrackerState, reason: LostReason) {
 mod tests {
     use super::*;
     use crate::test_scene::TestScene;
+    use tryon_geometry::camera::DepthImage;
 
     type Spoil = fn(&mut TrackerState);
 

@@ -329,9 +329,11 @@ mod tests {
     /// Evidence of given log odds.
     fn of_odds(odds: f32) -> PersonEvidence {
         let settings = BeliefSettings::default();
+        let agreement = (odds - settings.bias) / settings.weights[0];
+        let of_start = settings.start_bias + settings.start_weights[0] * agreement;
         PersonEvidence {
-            agreement: (odds - settings.bias) / settings.weights[0],
-            matched: (odds - settings.start_bias) / settings.start_weights[2],
+            agreement,
+            matched: (odds - of_start) / settings.start_weights[2],
             ..PersonEvidence::default()
         }
     }

@@ -87,6 +87,17 @@ impl Refusals {
         });
     }
 
+    /// Lets a candidate wait for this frame, whatever it was refused for.
+    pub fn hold(&mut self, candidate: CandidateBox, settings: &RefusalSettings) {
+        if self.of(&candidate, settings).is_none() {
+            self.record(candidate, 0.0, settings);
+        }
+        let own = |r: &&mut Refusal| r.candidate.is_same(&candidate, settings);
+        if let Some(refusal) = self.0.iter_mut().find(own) {
+            refusal.wait = refusal.wait.max(1);
+        }
+    }
+
     /// Forgets the refusal of a candidate; returns how often it was refused.
     pub fn forget(&mut self, candidate: &CandidateBox, settings: &RefusalSettings) -> u32 {
         let place = self

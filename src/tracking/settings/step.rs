@@ -29,6 +29,11 @@ settings! {
         pub resting_frames: u32 = 15,
         /// Stride of the change detection over the grid of an empty scene. Larger notices a small person later.
         pub empty_stride: u32 = 2,
+        /// Time without own motion after which a subject is a thing, seconds. Who stands as still as possible sways by 2 mm in
+        /// it. Larger dresses mannequins for longer.
+        pub motionless: f64 = 3.0,
+        /// Most things that are remembered until they move.
+        pub most_things: usize = 8,
         /// Unchanged frames.
         pub change: ChangeSettings = ChangeSettings::default(),
     }
