@@ -1,4 +1,4 @@
-//! What never moved isn't a person: who stands still sways by more than a sensor's noise.
+//! Own motion: a subject without it isn't a person. Who stands still sways by more than a sensor's noise.
 
 use super::block_readings::BlockReadings;
 use crate::segment::CandidateBox;

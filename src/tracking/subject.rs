@@ -181,7 +181,9 @@ impl SubjectFrame<'_> {
         self.assess(&pose, workspace, log);
         let mut classified = found;
         if config.rescue {
-            self.hide_arms(&mut pose, workspace, log);
+            let is_detected = workspace.fit.terms.hands.map(|h| h.is_some());
+            (state.repair).see_hands(is_detected, &config.recover.repair);
+            self.hide_arms(&mut pose, state.repair.is_held(), workspace, log);
             classified |= self.repair(state, workspace, &mut pose, &mut fit, log);
         }
         if classified || state.is_unsure || self.sighting.is_some() {
@@ -252,7 +254,13 @@ impl SubjectFrame<'_> {
 
     /// Puts arms in free space that no reading holds behind the readings while these are all covered, where that brings them
     /// out of it. An arm in a sleeve without return stays: that looks like free space, too.
-    fn hide_arms(&self, pose: &mut Pose<Camera>, workspace: &mut Workspace, log: &mut StepLog) {
+    fn hide_arms(
+        &self,
+        pose: &mut Pose<Camera>,
+        is_held: [bool; 2],
+        workspace: &mut Workspace,
+        log: &mut StepLog,
+    ) {
         let settings = &self.model.config.recover.hidden;
         let parts = [BodyPart::LeftArm, BodyPart::RightArm];
         for (side, part) in parts.into_iter().enumerate() {
@@ -261,8 +269,7 @@ impl SubjectFrame<'_> {
             };
             let before = log.report.agreement;
             let in_air = before.parts[part as usize];
-            let has_hand = workspace.fit.terms.hands[side].is_some();
-            let is_dark = has_hand || before.unknown[part as usize] > settings.most_unknown;
+            let is_dark = is_held[side] || before.unknown[part as usize] > settings.most_unknown;
             let is_hidden =
                 limb.is_hinge_unseen(&workspace.fit.unseen, settings.unseen) && !is_dark;
             if !is_hidden || before.uncovered > settings.most_uncovered || in_air < settings.in_air
@@ -373,6 +380,7 @@ impl SubjectFrame<'_> {
             agreement: log.report.agreement,
             is_contradicted,
             is_stuck: state.repair.is_stuck(settings),
+            is_held: state.repair.is_held(),
         };
         let repaired = repair.search(&mut workspace.fit, &mut workspace.agreement);
         let found = repaired.is_some();

@@ -22,9 +22,28 @@ pub(crate) struct RepairTimer {
     /// Frames in a row with a part in the air.
     #[serde(default)]
     in_air: u32,
+    /// Frames for which a hand that was detected still holds its arm, left and right.
+    #[serde(default)]
+    held: [u32; 2],
 }
 
 impl RepairTimer {
+    /// Records the hands that a frame shows beyond sleeves without return.
+    pub(crate) fn see_hands(&mut self, is_detected: [bool; 2], settings: &RepairSettings) {
+        for (held, is_detected) in self.held.iter_mut().zip(is_detected) {
+            *held = if is_detected {
+                settings.hand_memory
+            } else {
+                held.saturating_sub(1)
+            };
+        }
+    }
+
+    /// Arms whose hand was detected a moment ago, left and right: their sleeves only seem to be in the air.
+    pub(crate) fn is_held(&self) -> [bool; 2] {
+        self.held.map(|frames| frames > 0)
+    }
+
     /// Records a frame's agreement; true when a repair is due.
     pub(crate) fn is_due(&mut self, agreement: &Agreement, settings: &RepairSettings) -> bool {
         self.wait = self.wait.saturating_sub(1);
@@ -71,6 +90,8 @@ pub(crate) struct Repair<'a> {
     pub is_contradicted: bool,
     /// A limb has been in the air for a while: unless it is found, it rests unseen.
     pub is_stuck: bool,
+    /// Arms whose hand was detected a moment ago, left and right.
+    pub is_held: [bool; 2],
 }
 
 /// Bound on the cost and on the wrong share of the area of a better pose.
@@ -167,7 +188,13 @@ impl Repair<'_> {
     fn out_of_the_air(&self, scratch: &mut FitScratch) -> Option<Pose> {
         let settings = &self.context.model.config.recover.repair;
         let parts = BodyPart::ALL.into_iter().zip(self.agreement.parts);
-        let in_air = parts.filter(|(_, free)| *free > settings.part_in_air);
+        let [left, right] = self.is_held;
+        let is_held = |part| match part {
+            BodyPart::LeftArm => left,
+            BodyPart::RightArm => right,
+            _ => false,
+        };
+        let in_air = parts.filter(|(part, free)| *free > settings.part_in_air && !is_held(*part));
         in_air.fold(None, |best, (part, _)| {
             let pose = best.as_ref().unwrap_or(self.pose);
             resting_limb(&self.context, pose, part, &mut scratch.bones).or(best)

@@ -60,16 +60,16 @@ settings! {
         pub hidden_head: f32 = 0.45,
         /// Log odds of a start per unit of agreement, covered head and matched points: logistic regression on the starts of
         /// `tryon-bench people` (docs/decisions/047).
-        pub start_weights: [f32; 3] = [10.9, 8.6, 9.9],
-        /// Log odds of a start at zero, 1.5 below the same regression's: a mannequin's frames add up.
-        pub start_bias: f32 = -17.6,
+        pub start_weights: [f32; 3] = [18.3, 0.8, 7.0],
+        /// Log odds of a start at zero.
+        pub start_bias: f32 = -10.1,
         /// Log odds of a followed person per unit of agreement, similarity and covered head. Who was found whole may be
         /// hidden in part later: matched points say nothing any more.
-        pub weights: [f32; 3] = [11.8, 12.6, 8.0],
+        pub weights: [f32; 3] = [15.0, 8.6, 3.7],
         /// Log odds of a followed person at zero.
-        pub bias: f32 = -19.8,
-        /// Summed log odds from which a subject is a person. Larger starts later; the most likely of 289 starts of things
-        /// had −0.3.
+        pub bias: f32 = -11.4,
+        /// Summed log odds from which a subject is a person. Larger starts later; the most likely of 300 starts of things
+        /// had −2.5.
         pub sure: f32 = 3.0,
         /// Least log odds that earlier refusals leave: a mannequin that is taken away lets a person stand in its place.
         pub most_doubt: f32 = -6.0,

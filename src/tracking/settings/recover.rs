@@ -53,6 +53,9 @@ settings! {
         pub worse: f32 = 1.5,
         /// Factor on the cost that a better pose undercuts. 1 changes poses by noise.
         pub cheaper: f64 = 0.95,
+        /// Frames for which a detected hand holds its arm after it was seen last: detection flickers. Larger leaves an arm in
+        /// the air for longer.
+        pub hand_memory: u32 = 15,
         /// Frames after which a limb in the air rests unseen: fast ones lag by three (jacks).
         pub stuck: u32 = 4,
         /// Share of a part in free space above which a stuck one is tried at rest. Smaller moves limbs that are right.

@@ -1,6 +1,7 @@
 //! Proposed places of a template's joints, from the part network.
 
 use crate::fit::FitScratch;
+use crate::model::part_classes::kind_of;
 use crate::model::{NECK_CLASS, PART_CLASSES, PartClasses, PartKind, TrackerModel};
 use crate::registration::residual::JointTarget;
 use crate::segment::part_network::JointProposal;
@@ -64,10 +65,15 @@ impl JointProposals {
         anchors.sort_by(|a, b| a.class.cmp(&b.class).then(b.weight.total_cmp(&a.weight)));
         Self { anchors }
     }
-    /// For each class the heavy proposal nearest to its anchor among the scratch's bones.
+    /// For each class the heavy proposal nearest to its anchor among the scratch's bones; none for the arm of a detected hand.
     pub(crate) fn targets(&self, model: &TrackerModel, scratch: &FitScratch) -> Vec<JointTarget> {
         let settings = &model.config.start.proposals;
         let joints = &scratch.bones.joints;
+        use PartKind::{Elbow, Forearm, Hand, UpperArm};
+        let is_held = |class: u8| {
+            let arm = kind_of(class).filter(|k| matches!(k.0, UpperArm | Elbow | Forearm | Hand));
+            arm.is_some_and(|(_, side)| scratch.terms.hands[side as usize].is_some())
+        };
         let of_class = |class: u8| {
             let [a, b] = model.part_classes.anchor(class)?;
             let now = model.part_classes.anchor_of(class, joints)?;
@@ -84,7 +90,8 @@ impl JointProposals {
                 weight,
             })
         };
-        (0..PART_CLASSES as u8).filter_map(of_class).collect()
+        let open = (0..PART_CLASSES as u8).filter(|class| !is_held(*class));
+        open.filter_map(of_class).collect()
     }
     /// Places of a class's anchor, heaviest first.
     pub fn of_class(&self, class: u8) -> impl Iterator<Item = (P3, f32)> + '_ {

@@ -86,7 +86,8 @@ fn track_all(
                 continue;
             }
         };
-        if let Some(eye) = eye.as_mut().filter(|_| index as u64 % COLOR_INTERVAL == 0)
+        let is_due = (index as u64).is_multiple_of(COLOR_INTERVAL);
+        if let Some(eye) = eye.as_mut().filter(|_| is_due)
             && let Some(sighting) = eye.look(&frame).with_context(|| format!("frame {index}"))?
         {
             state.see(sighting);

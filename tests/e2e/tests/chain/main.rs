@@ -6,6 +6,7 @@
     clippy::print_stdout
 )]
 
+mod color;
 mod consent;
 mod faults;
 mod fine;
