@@ -4,7 +4,7 @@ use crate::segment::part_network::{JointProposal, PersonCells, PersonParts, YawB
 use crate::settings::SightingSettings;
 use serde::{Deserialize, Serialize};
 use tryon_body::TrunkSides;
-use tryon_geometry::math::{P3, P3d, V3};
+use tryon_geometry::math::{P3d, V3};
 
 /// A person found in the colour image of a frame, in the depth camera's frame.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -26,11 +26,11 @@ impl ColorSighting {
         settings: &SightingSettings,
     ) -> bool {
         let age = time_ns.checked_sub(self.time_ns).map(|ns| ns as f64 * 1e-9);
-        let (Some(trunk), Some(middle)) = (self.middle(), middle(person)) else {
+        let Some(trunk) = self.middle().filter(|_| !person.cells.is_empty()) else {
             return false;
         };
-        age.is_some_and(|s| s <= settings.oldest)
-            && level(&(trunk - middle.cast::<f64>()).cast(), &person.up).norm() < settings.apart
+        let off = (trunk - person.middle().cast::<f64>()).cast();
+        age.is_some_and(|s| s <= settings.oldest) && level(&off, &person.up).norm() < settings.apart
     }
 
     /// Joins yaw and joints to what the part network saw of the same person.
@@ -70,14 +70,6 @@ impl ColorSighting {
 /// Part of a vector across gravity.
 fn level(v: &V3, up: &V3) -> V3 {
     v - up * up.dot(v)
-}
-
-/// Mean of the person's readings; `None` without one.
-fn middle(person: &PersonCells<'_>) -> Option<P3> {
-    let sum: V3 = (person.cells.iter())
-        .map(|c| person.cloud.centre(*c as usize).coords)
-        .sum();
-    (!person.cells.is_empty()).then(|| P3::from(sum / person.cells.len() as f32))
 }
 
 #[cfg(test)]

@@ -50,11 +50,7 @@ pub fn facing(person: &PersonCells<'_>, votes: &YawBelief) -> Option<Facing> {
         .filter(|k| wrapped(FRAC_PI_4 * *k as f32 - yaw).abs() > 2.0 * FRAC_PI_4)
         .map(|k| belief[k])
         .sum();
-    let points = person
-        .cells
-        .iter()
-        .map(|&c| person.cloud.centre(c as usize).coords);
-    let middle = points.sum::<V3>() / person.cells.len().max(1) as f32;
+    let middle = person.middle().coords;
     let [to_camera, side] = level_axes(&middle.cast(), &person.up.cast())?;
     let (s, c) = f64::from(yaw).sin_cos();
     Some(Facing {

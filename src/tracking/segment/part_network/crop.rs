@@ -25,6 +25,17 @@ pub struct PersonCells<'a> {
     pub up: V3,
 }
 
+impl PersonCells<'_> {
+    /// Mean of the person's readings, camera frame, metres; the origin without one.
+    pub fn middle(&self) -> P3 {
+        let points = self
+            .cells
+            .iter()
+            .map(|c| self.cloud.centre(*c as usize).coords);
+        P3::from(points.sum::<V3>() / self.cells.len().max(1) as f32)
+    }
+}
+
 /// A square window about a person's cells. Its coordinates are right, down and away: right and down across the window from
 /// 0 to 1, away from its middle in units of its side, level with respect to gravity.
 #[derive(Clone, Copy, Debug, PartialEq)]
