@@ -104,6 +104,26 @@ impl BlockReadings {
         sum > settings.changed[0] * settings.changed[0] * counted as f32
     }
 
+    /// Root mean square over the blocks of the standard error of a block's mean change, millimetres: what noise hides. 0
+    /// without blocks.
+    pub(super) fn standard_error(&self, image: &DepthImage, settings: &ChangeSettings) -> f32 {
+        let most = settings.most_change;
+        let blocks = self.blocks.iter().zip(self.readings.chunks_exact(AREA));
+        let of_block = |(&block, before): (&u32, &[u16])| {
+            let (mut first, mut second, mut k) = (0i32, 0i32, 0);
+            samples(image, self.step, self.columns, block, |now| {
+                let change = (i32::from(now) - i32::from(before[k])).clamp(-most, most);
+                k += 1;
+                first += change;
+                second += change * change;
+            });
+            let mean = first as f32 / AREA as f32;
+            (second as f32 / AREA as f32 - mean * mean).max(0.0) / AREA as f32
+        };
+        let sum: f32 = blocks.map(of_block).sum();
+        (sum / self.blocks.len().max(1) as f32).sqrt()
+    }
+
     /// True for an image with the same readings to the bit: a picture shown again, not seen again.
     pub(super) fn is_repeated(&self, image: &DepthImage) -> bool {
         let blocks = self.blocks.iter().zip(self.readings.chunks_exact(AREA));

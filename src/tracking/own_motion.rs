@@ -45,8 +45,9 @@ impl StillSubject {
         if self.readings.has_changed(image, &settings.change) {
             return OwnMotion::Moved;
         }
-        // One picture shown again and again says nothing.
-        if self.readings.is_repeated(image) {
+        // One picture shown again and again says nothing, nor does a sensor whose noise hides the sway.
+        let noise = self.readings.standard_error(image, &settings.change);
+        if self.readings.is_repeated(image) || noise > settings.most_noise {
             self.since_ns = time_ns;
         }
         let seconds = time_ns.saturating_sub(self.since_ns) as f64 * 1e-9;
@@ -100,6 +101,8 @@ mod tests {
         state: TrackerState,
         workspace: Workspace,
         frames: u64,
+        /// Largest noise, millimetres.
+        noise: i16,
     }
 
     impl Session {
@@ -110,6 +113,7 @@ mod tests {
                 workspace: Workspace::default(),
                 scene,
                 frames: 0,
+                noise: 4,
             }
         }
 
@@ -121,8 +125,9 @@ mod tests {
             let mut image = self.scene.depth(&pose);
             if let Some(seed) = noise {
                 let mut rng = rand_pcg::Pcg32::seed_from_u64(seed);
+                let most = self.noise;
                 for d in image.data_mut().iter_mut().filter(|d| **d > 0) {
-                    *d = d.saturating_add_signed(rng.random_range(-4..=4));
+                    *d = d.saturating_add_signed(rng.random_range(-most..=most));
                 }
             }
             image
@@ -174,5 +179,15 @@ mod tests {
         assert!(live[10..].iter().all(|l| *l), "{live:?}");
         let live = Session::new().live(|_| (0.0, None));
         assert!(live[10..].iter().all(|l| *l), "{live:?}");
+    }
+
+    #[test]
+    fn noise_that_hides_a_sway_says_nothing() {
+        let mut session = Session {
+            noise: 20,
+            ..Session::new()
+        };
+        let live = session.live(|i| (0.0, Some(i)));
+        assert!(session.state.things.is_empty() && live[99], "{live:?}");
     }
 }

@@ -32,6 +32,9 @@ settings! {
         /// Time without own motion after which a subject is a thing, seconds. Who stands as still as possible sways by 2 mm in
         /// it. Larger dresses mannequins for longer.
         pub motionless: f64 = 3.0,
+        /// Standard error of a block's mean change above which nobody is said to be motionless, millimetres: a sway of 2 mm is
+        /// 1.25 times it with the dead band. Larger leaves people who stand still far away.
+        pub most_noise: f32 = 1.4,
         /// Most things that are remembered until they move.
         pub most_things: usize = 8,
         /// Unchanged frames.
