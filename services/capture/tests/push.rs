@@ -98,6 +98,10 @@ async fn frames_arrive_as_they_were_sent_and_only_while_somebody_may_see_them() 
     hold(&mut client).await;
     let answer = sender.send(frame(2)).await.expect("answered");
     assert_eq!((answer.number, answer.outcome()), (2, FrameOutcome::Taken));
+    // Taken, it is still on its way to where a recording would begin.
+    while camera(&mut client).await.frames < 1 {
+        tokio::task::yield_now().await;
+    }
 
     let request = StartRecordingRequest {
         camera: "front".into(),
