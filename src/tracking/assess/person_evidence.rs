@@ -70,6 +70,13 @@ impl FittedImage<'_> {
         std::array::from_fn(|part| 2 * missing[part] <= all[part])
     }
 
+    /// True where something else stands before the body.
+    fn is_hidden(&self, cell: usize) -> bool {
+        let settings = &self.model.config.assess.belief;
+        let (seen, drawn) = (self.grid.depth[cell], self.image.depth[cell]);
+        self.grid.labels[cell] == Label::Other && seen < drawn - settings.covered
+    }
+
     /// True where the subject covers the body.
     fn is_covered(&self, cell: usize) -> bool {
         let settings = &self.model.config.assess.belief;
@@ -110,7 +117,9 @@ impl PersonEvidence {
                 sums.add_reading(map.shares(i), body.kind(cell));
             }
         }
-        let is_expected = |&cell: &usize| body.has_return(cell) && counts(cell) == Some(true);
+        let is_expected = |&cell: &usize| {
+            body.has_return(cell) && counts(cell) == Some(true) && !body.is_hidden(cell)
+        };
         for cell in (0..image.index.len()).filter(is_expected) {
             sums.add_drawn(&body, cell);
         }

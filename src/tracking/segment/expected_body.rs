@@ -11,6 +11,23 @@ pub(super) struct ExpectedBody<'a> {
     pub(super) settings: &'a ExpectedBodySettings,
 }
 
+/// Samples around a cell, in units of the reach.
+const AROUND: [[f32; 2]; 13] = [
+    [0.0, 0.0],
+    [0.5, 0.0],
+    [-0.5, 0.0],
+    [0.0, 0.5],
+    [0.0, -0.5],
+    [1.0, 0.0],
+    [-1.0, 0.0],
+    [0.0, 1.0],
+    [0.0, -1.0],
+    [0.7, 0.7],
+    [0.7, -0.7],
+    [-0.7, 0.7],
+    [-0.7, -0.7],
+];
+
 /// Area of a cell at depth `z` that faces the camera, m².
 fn cell_area(cloud: &OrganisedCloud, z: f32) -> f32 {
     let [fx, fy] = cloud.focal();
@@ -35,6 +52,49 @@ impl ExpectedBody<'_> {
         let of = |c: &Component| areas[c.id as usize];
         let covering = map.list.iter().filter(|c| of(c) > least);
         covering.max_by(|a, b| of(a).total_cmp(&of(b)).then(b.id.cmp(&a.id)))
+    }
+
+    /// Components with a cell in four near the body, across the view and in depth: its limbs, not who passes before it. All
+    /// where nothing is expected. Shape `[components]`.
+    pub(super) fn own(self, cloud: &OrganisedCloud, map: &ComponentMap) -> Vec<bool> {
+        if self.depth.is_empty() {
+            return vec![true; map.list.len()];
+        }
+        let mut near = vec![0usize; map.list.len()];
+        for (cell, id) in map.of_cell.iter().enumerate() {
+            if *id != ComponentMap::NONE && self.is_near(cloud, cell) {
+                near[*id as usize] += 1;
+            }
+        }
+        let own = |c: &Component| 4 * near[c.id as usize] >= c.cells;
+        map.list.iter().map(own).collect()
+    }
+
+    /// True for a reading near the body, by samples around it.
+    fn is_near(self, cloud: &OrganisedCloud, cell: usize) -> bool {
+        let settings = self.settings;
+        let (columns, rows) = cloud.size();
+        let z = cloud.depth[cell];
+        let reach = settings.around * cloud.focal()[0] / z;
+        let (u, v) = ((cell % columns) as f32, (cell / columns) as f32);
+        let is_body = |[x, y]: [f32; 2]| {
+            let (u, v) = (u + x * reach, v + y * reach);
+            let is_inside = u >= 0.0 && v >= 0.0 && u < columns as f32 && v < rows as f32;
+            is_inside
+                && (self.depth[v as usize * columns + u as usize] - z).abs() < settings.same_body
+        };
+        AROUND.into_iter().any(is_body)
+    }
+
+    /// True where something stands before most of the body.
+    pub(super) fn is_hidden(self, cloud: &OrganisedCloud) -> bool {
+        let (mut hidden, mut drawn) = (0, 0);
+        for (z, seen) in self.depth.iter().zip(&cloud.depth) {
+            drawn += usize::from(z.is_finite());
+            let is_before = *seen > 0.0 && *seen < z - self.settings.same_body;
+            hidden += usize::from(z.is_finite() && is_before);
+        }
+        2 * hidden > drawn
     }
 
     /// Distance from the body beyond which cells are not the person's, cells, with the distances in `to_body`; `None` unless
@@ -146,6 +206,30 @@ mod tests {
                     "{first} {last}"
                 );
             }
+        }
+    }
+
+    #[test]
+    fn who_passes_before_the_body_is_no_limb_of_it() {
+        // A box at 2 m and, over its border, a bar of 0.3 × 1.2 m before it.
+        let is_box = |x: f64, y: f64| x.abs() < 0.1 && y.abs() < 0.35;
+        let alone = cloud_of(|x, y| if is_box(x, y) { 2000 } else { 0 });
+        let drawn = alone.depth.iter();
+        let body: Vec<f32> = drawn
+            .map(|z| if *z > 0.0 { *z } else { f32::INFINITY })
+            .collect();
+        for (z, is_limb) in [(1.8, true), (1.4, false)] {
+            let mut cloud = cloud_of(|x, y| {
+                let is_bar = (0.1..0.4).contains(&(x * z)) && (y * z).abs() < 0.6;
+                match () {
+                    () if is_bar => (z * 1000.0) as u16,
+                    () if is_box(x, y) => 2000,
+                    () => 0,
+                }
+            });
+            let (_, last) = columns(&mut cloud, &body).expect("a person");
+            let border = cloud.size().0 / 2 + (0.1 * cloud.focal()[0]) as usize;
+            assert_eq!(last > border + 2, is_limb, "{z} m");
         }
     }
 

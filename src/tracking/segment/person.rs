@@ -99,7 +99,8 @@ pub fn find_person(
     let main = match choice {
         PersonChoice::Near(prior) => {
             let covering = expected.covering(cloud, map, sizes.prior_share * sizes.least_area);
-            covering.or_else(|| nearest(&map.list, prior, sizes))
+            let moved = || nearest(&map.list, prior, sizes).filter(|_| !expected.is_hidden(cloud));
+            covering.or_else(moved)
         }
         PersonChoice::First => {
             let ranked = ranked(cloud, map, sizes);
@@ -117,7 +118,7 @@ pub fn find_person(
     };
     out.candidate = Some(main.candidate());
 
-    let mut members = with_limbs(cloud, map, main, sizes);
+    let mut members = with_limbs(cloud, map, main, &expected.own(cloud, map), sizes);
     let to_body = &mut scratch.to_body;
     let limit = expected.split_limit(cloud, map, &members, to_body);
     if let Some(limit) = limit {
@@ -253,11 +254,13 @@ fn ranked<'a>(
     whole
 }
 
-/// The main component and the parts that its own limbs cut off: near it in the image and in depth. Shape `[components]`.
+/// The main component and the parts that its own limbs cut off, of those that may be its `own`: near it in the image and in
+/// depth. Shape `[components]`.
 fn with_limbs(
     cloud: &OrganisedCloud,
     map: &ComponentMap,
     main: &Component,
+    own: &[bool],
     settings: &PersonSettings,
 ) -> Vec<bool> {
     let mut members = vec![false; map.list.len()];
@@ -270,7 +273,8 @@ fn with_limbs(
                 continue;
             }
             let c = &map.list[*id as usize];
-            let limb = (c.centre.z - main.centre.z).abs() < settings.limb_reach
+            let limb = own[*id as usize]
+                && (c.centre.z - main.centre.z).abs() < settings.limb_reach
                 && c.lo.z > main.lo.z - settings.limb_reach
                 && c.hi.z < main.hi.z + settings.limb_reach
                 && area + c.area < settings.most_area

@@ -89,7 +89,7 @@ fn picture(shop: &Shop, visitors: &[Visitor], i: u64) -> (DepthImage, Vec<Points
 }
 
 /// The person whose torso is within `near` (m) of the tracked one.
-fn identity(ours: &Points, people: &[Points], near: f64) -> Option<usize> {
+pub(super) fn identity(ours: &Points, people: &[Points], near: f64) -> Option<usize> {
     let at: P3d = torso(ours);
     let off = people.iter().map(|p| (torso(p) - at).norm());
     let nearest = off.enumerate().min_by(|a, b| a.1.total_cmp(&b.1))?;
