@@ -1,4 +1,4 @@
-//! The embedded body: a parametric human figure of 13,000 vertices with nine directions of shape.
+//! The embedded body: a parametric human figure of 13,000 vertices with ten directions of shape.
 //!
 //! `tryon-bench make-body` makes its file; a test there makes it again and compares.
 
@@ -6,7 +6,7 @@ use super::Template;
 use std::sync::{Arc, OnceLock};
 
 /// Names of the directions, in order; `sex` +1 is the mean man, −1 the mean woman.
-pub const DIRECTIONS: [&str; 9] = [
+pub const DIRECTIONS: [&str; 10] = [
     "stature",
     "girth",
     "sex",
@@ -16,6 +16,7 @@ pub const DIRECTIONS: [&str; 9] = [
     "chest",
     "waist",
     "hip",
+    "belly",
 ];
 
 /// Largest sound coefficient, standard deviations: spans 98.8 % of a normally distributed population.

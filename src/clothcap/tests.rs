@@ -167,7 +167,7 @@ fn mean_change(a: &FrameCapture, b: &FrameCapture) -> f64 {
 }
 
 #[test]
-fn skipping_is_counted_and_changes_garments_by_less_than_a_tenth_of_a_millimetre() {
+fn skipping_is_counted_and_changes_garments_by_a_third_of_a_millimetre_at_most() {
     let scans = [0.6, 0.7].map(|yaw| TestScan::new(yaw, BLUE, GREY).scan());
     let captured = |without_skips| {
         let mut capture = capture(OutfitCaptureConfig {
@@ -182,7 +182,7 @@ fn skipping_is_counted_and_changes_garments_by_less_than_a_tenth_of_a_millimetre
     assert_eq!(whole[0].garments, some[0].garments);
     assert_eq!(some[0].report.queries.skipped, 0);
     let change = mean_change(&whole[1], &some[1]);
-    assert!(change < 1e-4, "{change}");
+    assert!(change < 3.3e-4, "{change}");
     assert_eq!(whole[1].report.queries.skipped, 0);
     assert_eq!(whole[1].report.alignment.queries.skipped, 0);
     let report = &some[1].report;

@@ -3,6 +3,7 @@
 use tryon::body::embedded;
 use tryon::formats::open_recording;
 use tryon::formats::shared_data;
+use tryon::garment::Size;
 use tryon::mirror::{Choice, Mirror};
 use tryon::view::OffPerson;
 
@@ -12,13 +13,13 @@ const MOST_ABOVE: f64 = 0.03;
 /// Share of the frames that are dressed, at least. Measured: 1.
 const LEAST_DRESSED: f64 = 0.98;
 
-/// Dresses a sequence in a long-sleeved shirt and judges its pictures.
-fn check(sequence: &str) {
+/// Dresses a sequence in a long-sleeved shirt of a size, or of the body's, and judges its pictures.
+fn check(sequence: &str, size: Option<Size>) {
     let Some(folder) = shared_data(sequence) else {
         return;
     };
     let mut recording = open_recording(&folder).expect("a recording");
-    let choices = vec![Choice::library("longsleeve", None).expect("a garment")];
+    let choices = vec![Choice::library("longsleeve", size).expect("a garment")];
     let mut mirror = Mirror::new(embedded::template(), recording.calibration(), choices);
     mirror.set_off_person_interval(0.0);
     let (mut shares, mut provisional, mut frames) = (Vec::new(), Vec::new(), 0);
@@ -48,10 +49,12 @@ fn check(sequence: &str) {
 
 #[test]
 fn sleeves_stay_on_the_arms_of_a_dancer() {
-    check("sequences/charleston_m_heavy_tof_room");
+    check("sequences/charleston_m_heavy_tof_room", None);
 }
 
+/// In the size that leaves 3 to 4 cm at the chest: with the 11 cm of the next one a sleeve hangs off the arm by right, and the
+/// body is between both.
 #[test]
 fn sleeves_stay_on_the_arms_of_jumping_jacks() {
-    check("sequences/jacks_f_avg_kinect1_room");
+    check("sequences/jacks_f_avg_kinect1_room", Some(Size::Xs));
 }

@@ -2,7 +2,7 @@
 //!
 //! Girths, breadths and sex: the vertices follow their bones, then are projected onto the surface of the changed
 //! figure; a direction is half the difference between +1 and −1. Lengths: bones are stretched, sections grow less.
-//! Each direction is then scaled until its own measure moves by its published standard deviation.
+//! Each direction but the belly is then scaled until its own measure moves by its published standard deviation.
 
 use super::field::Field;
 use super::figure::{Figure, Joints};
@@ -190,7 +190,7 @@ fn section_growth(settings: &BodySettings, segment: BodySegment) -> f64 {
 }
 
 /// The directions before they are scaled to their targets, in the order of [`DIRECTIONS`].
-fn raw_directions(source: &ShapeSource) -> [(Direction, Option<Target>); 9] {
+fn raw_directions(source: &ShapeSource) -> [(Direction, Option<Target>); 10] {
     use BodySegment::{Abdomen, Chest, Collar, Foot, Forearm, Hand, Head, Neck, Shin};
     let settings = source.settings;
     let growth = stat::STATURE.deviation() / stat::STATURE.mean();
@@ -227,6 +227,7 @@ fn raw_directions(source: &ShapeSource) -> [(Direction, Option<Target>); 9] {
         (figure(|f| &mut f.chest), Some((|m| m.chest, chest))),
         (figure(|f| &mut f.waist), Some((|m| m.waist, waist))),
         (figure(|f| &mut f.hip), Some((|m| m.hip, hip))),
+        (figure(|f| &mut f.belly), None),
     ]
 }
 

@@ -13,6 +13,8 @@ pub(super) struct Figure {
     pub chest: f64,
     pub waist: f64,
     pub hip: f64,
+    /// Depth of the abdomen at equal girth of chest and hip: 25 mm a unit, no published deviation.
+    pub belly: f64,
 }
 
 /// Joint positions of the left half, metres.

@@ -313,6 +313,23 @@ fn a_unit_is_a_standard_deviation() {
 }
 
 #[test]
+fn the_belly_bulges_to_the_front_alone() {
+    let t = template();
+    let d = DIRECTIONS.iter().position(|d| *d == "belly").expect("one");
+    let space = t.shape_space().expect("shape space");
+    let moved = t.mesh().vertices().iter().zip(&space.vertices[d]);
+    let farthest = |is_there: fn(&P3) -> bool| {
+        let there = moved.clone().filter(|(p, _)| is_there(p));
+        there.map(|(_, by)| by.norm()).fold(0.0, f32::max)
+    };
+    let navel = farthest(|p| p.x.abs() < 0.02 && p.z > 0.08 && (p.y - 1.04).abs() < 0.02);
+    assert!((0.02..0.03).contains(&navel), "{navel} m");
+    assert!(farthest(|p| p.z < -0.06) < 0.003, "the back");
+    assert!(farthest(|p| p.y > 1.3 || p.y < 0.8) < 0.003, "the ends");
+    assert!(space.joints[d].iter().all(|j| j.norm() == 0.0));
+}
+
+#[test]
 fn whole_range_of_shapes_is_sound() {
     let t = template();
     for (d, name) in DIRECTIONS.iter().enumerate() {

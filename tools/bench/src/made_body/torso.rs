@@ -55,7 +55,8 @@ fn outline(f: &mut Field, fig: &Figure) {
                 + 0.008 * fig.waist * hump(y, 1.05, 0.16)
                 + 0.007 * fig.hip * hump(y, 0.89, 0.17);
             let hw = r[1] + s * r[5] + g * r[8] + local;
-            let zf = r[2] + s * r[6] + g * r[9] + local;
+            let belly = 0.025 * fig.belly * hump(y, 1.04, 0.22);
+            let zf = r[2] + s * r[6] + g * r[9] + local + belly;
             let zb = r[3] + s * r[7] + g * r[10] - local;
             let (cz, rz) = (0.5 * (zf + zb), 0.5 * (zf - zb));
             Station {
