@@ -9,7 +9,7 @@
 //! - Floor by voting, background by RANSAC: [`mod@segment::plane_search`].
 //! - The nearest body: [`mod@segment::person`], [`mod@segment::components`].
 //! - Candidates refused before: [`mod@segment::refusals`].
-//! - People side by side: [`mod@segment::expected_body`].
+//! - People side by side, and who passes: [`mod@segment::expected_body`].
 //! - True outline against occlusion edges: [`mod@segment::edges`].
 //! - Ends of limbs: [`mod@segment::extremities`].
 //! - Hands beyond sleeves without return: [`mod@segment::hands`].
@@ -53,7 +53,7 @@
 //!
 //! Size and surface:
 //!
-//! - Bone scales and shape coefficients (eq. 18 to 23): [`mod@shape::size`].
+//! - Bone scales and shape coefficients (eq. 18 to 23): [`mod@shape::size`]; by the side seen: [`mod@shape::view_information`].
 //! - In turns with the pose: [`mod@shape::calibration`].
 //! - Displacements (eq. 13 to 17): [`mod@shape::surface`], when they are due: [`mod@adaptation`].
 //! - Bodies that were measured before: [`mod@shape::known_body`], [`mod@shape::probation`], [`mod@known_subject`].

@@ -10,12 +10,16 @@ use std::time::Instant;
 pub struct TrackingStagesMs {
     /// Sampling the depth image, floor, background, person, outline.
     pub segment: f64,
-    /// Initial pose and limb recovery.
+    /// Initial pose.
     pub place: f64,
     /// Prediction and pose.
     pub pose: f64,
     /// Body size and shape.
     pub size: f64,
+    /// Filter of the pose, agreement, confidence, arms that no reading shows, and the rest of the step.
+    pub assess: f64,
+    /// Repairs and tests of person and facing, with the part network.
+    pub repair: f64,
     /// Displacements.
     pub surface: f64,
 }
@@ -23,7 +27,8 @@ pub struct TrackingStagesMs {
 impl TrackingStagesMs {
     /// All stages.
     pub fn total(&self) -> f64 {
-        self.segment + self.place + self.pose + self.size + self.surface
+        let fit = self.place + self.pose + self.size;
+        self.segment + fit + self.assess + self.repair + self.surface
     }
 }
 

@@ -204,7 +204,7 @@ impl TrackerState {
     pub fn is_sized(&self, config: &TrackerConfig) -> bool {
         self.size.is_settled || self.calibrated(config)
     }
-    /// True once size and shape no longer change.
+    /// True once the first frames have been used: later ones change size and shape only by views of the body that are new.
     pub(super) fn calibrated(&self, config: &TrackerConfig) -> bool {
         !config.adapt_size || self.size.frames >= config.calibration_frames
     }

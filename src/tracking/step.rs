@@ -76,7 +76,7 @@ pub fn follow(
     } else {
         seen.track(model, state, workspace, &mut log);
     }
-    let mut report = log.report;
+    let mut report = log.finish();
     report.status = state.status;
     report.pose_age = state.pose_age;
     if model.config.skip_unchanged {

@@ -67,6 +67,12 @@ impl StepLog {
         Self { report, watch }
     }
 
+    /// The report at the end of the step.
+    pub(super) fn finish(mut self) -> StepReport {
+        self.report.stages_ms.assess += self.watch.lap();
+        self.report
+    }
+
     fn add_turn(&mut self, turned: Option<TurnedPose>) {
         if let Some(turned) = turned {
             self.report.agreement = turned.agreement;
@@ -155,7 +161,7 @@ impl SubjectFrame<'_> {
         let good = fit.explained >= settings.least_explained
             && fit.matched >= settings.least_matched
             && pose.is_finite();
-        if good && !state.calibrated(config) {
+        if good && self.is_size_due(state, &pose, workspace) {
             let adapted = self.calibrate(state, &mut pose, &schedule, workspace);
             fit = adapted.unwrap_or(fit);
             log.report.stages_ms.size = log.watch.lap();
@@ -184,12 +190,14 @@ impl SubjectFrame<'_> {
             let is_detected = workspace.fit.terms.hands.map(|h| h.is_some());
             (state.repair).see_hands(is_detected, &config.recover.repair);
             self.hide_arms(&mut pose, state.repair.is_held(), workspace, log);
+            log.report.stages_ms.assess = log.watch.lap();
             classified |= self.repair(state, workspace, &mut pose, &mut fit, log);
         }
         if classified || state.is_unsure || self.sighting.is_some() {
             let subject = self.fitted(&mut pose, &mut fit);
             log.add_turn(subject.test(state, workspace, classified));
         }
+        log.report.stages_ms.repair += log.watch.lap();
         let agrees = log.report.agreement.wrong() <= settings.most_wrong;
         if state.belief.verdict == Verdict::Nobody || found && !agrees {
             if let Some(before) = before {
@@ -222,6 +230,23 @@ impl SubjectFrame<'_> {
             pose,
             fit,
         }
+    }
+
+    /// True at the start, and later while the body is seen as it hardly was before, without doubt.
+    fn is_size_due(
+        &self,
+        state: &TrackerState,
+        pose: &Pose<Camera>,
+        workspace: &Workspace,
+    ) -> bool {
+        let config = &self.model.config;
+        if !state.calibrated(config) {
+            return true;
+        }
+        let is_sure = state.disagreeing == 0 && state.bad_frames == 0 && !state.is_unsure;
+        let settings = &config.shape.size;
+        let root = workspace.fit.centre();
+        config.adapt_size && is_sure && state.size.is_view_open(pose, &root, settings)
     }
 
     /// Adapts size and shape to a fitted pose; the new fit where the pose was fitted again.
@@ -394,7 +419,6 @@ impl SubjectFrame<'_> {
         state
             .repair
             .record(found, log.report.agreement.wrong(), settings);
-        log.report.stages_ms.place += log.watch.lap();
         true
     }
 

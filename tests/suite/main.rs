@@ -19,6 +19,7 @@ mod offline_steps;
 mod on_person;
 mod others;
 mod seat;
+mod size;
 mod sleep;
 mod starts;
 mod stress;

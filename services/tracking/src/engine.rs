@@ -199,6 +199,7 @@ impl Engine {
                     of("segment", s.segment),
                     of("pose", s.place + s.pose),
                     of("shape", s.size),
+                    of("assess", s.assess + s.repair),
                 ]);
                 (state.residual_mm, state.visible_points) =
                     (r.residual_mm as f32, r.visible_points as u32);

@@ -57,6 +57,8 @@ settings! {
         /// Factor on earlier information per frame: its pairs belonged to a body not yet adapted. Smaller forgets earlier
         /// poses.
         pub fade: f64 = 0.95,
+        /// Frames of each view of the body that add to size and shape. More cost time, and follow clothes that are taken off.
+        pub view_frames: u32 = 30,
         /// Change of a coefficient that weighs as much as a change of a scale, for convergence. Larger adds rounds.
         pub scale_change: f64 = 10.0,
         /// Longest pair in the first frames, metres: feet of a wrong stature start 10 cm away.

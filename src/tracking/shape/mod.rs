@@ -5,6 +5,7 @@ pub(crate) mod known_body;
 pub(crate) mod probation;
 pub(crate) mod size;
 pub(crate) mod surface;
+pub(crate) mod view_information;
 
 pub(crate) use calibration::SizeCalibration;
 pub use known_body::{KnownBody, ShapeFault};

@@ -1,11 +1,13 @@
 //! Body size and shape: scales of bones (eq. 18 to 23) and coefficients of the shape space in one linear system.
 //!
 //! The paper solves for scales alone at a fixed pose. Here pose and size are linearised together and the pose is
-//! eliminated (Schur complement): a frame informs size only as far as no pose explains its readings. Information of the
-//! first frames adds up; the prior decides the rest.
+//! eliminated (Schur complement): a frame informs size only as far as no pose explains its readings. Information adds up
+//! over the views of the body; the prior decides the rest.
 
+use super::view_information::{SizeInformation, SizeView, ViewInformation};
 use crate::fit::{FitContext, FitScratch, assemble, for_each_point, pair};
 use crate::model::TrackerModel;
+use crate::settings::BodySizeSettings;
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3, Vector6};
 use serde::{Deserialize, Serialize};
 use tryon_body::measure::measure;
@@ -16,12 +18,8 @@ use tryon_body::{BodyShape, Pose, RestBody};
 pub struct SizeEstimate {
     /// Frames used so far.
     pub frames: u32,
-    /// Sum of the faded weights of the frames.
-    weight: f64,
-    /// Σ of Schur complements, per point, shape `[directions × directions]`; empty before the first frame.
-    information: Vec<f64>,
-    /// Σ of information × (estimate of the frame), shape `[directions]`.
-    evidence: Vec<f64>,
+    /// Schur complements of the frames by view.
+    views: ViewInformation,
     /// Girths of chest, natural waist and hip when they were last compared, metres.
     #[serde(default)]
     girths: Option<[f64; 3]>,
@@ -40,6 +38,7 @@ impl SizeEstimate {
     pub(crate) fn known(frames: u32) -> Self {
         Self {
             frames: frames.max(1),
+            views: ViewInformation::closed(),
             is_settled: true,
             ..Self::default()
         }
@@ -72,22 +71,16 @@ impl SizeEstimate {
         };
         let now = current(model, shape);
         let evidence = &information * &now + gradient;
-        let mut total = information;
-        let mut sum = evidence;
-        if self.information.len() == n * n {
-            total += DMatrix::from_column_slice(n, n, &self.information) * settings.fade;
-            sum += DVector::from_column_slice(&self.evidence) * settings.fade;
-        }
-        let frames = 1.0 + settings.fade * self.weight;
-        let Some(next) = solve(model, &total / frames, &sum / frames) else {
+        let frame = SizeInformation {
+            information,
+            evidence,
+        };
+        let view = SizeView::of(pose, &scratch.centre());
+        let total = self.views.with(view, frame, settings.fade, keep);
+        let Some(next) = solve(model, total) else {
             return 0.0;
         };
-        if keep {
-            self.frames += 1;
-            self.weight = frames;
-            self.information = total.as_slice().to_vec();
-            self.evidence = sum.as_slice().to_vec();
-        }
+        self.frames += u32::from(keep);
         store(model, &next, shape);
         (0..n)
             .map(|d| {
@@ -95,6 +88,16 @@ impl SizeEstimate {
                 (next[d] - now[d]).abs() * if is_scale { settings.scale_change } else { 1.0 }
             })
             .fold(0.0, f64::max)
+    }
+
+    /// True while frames of the view in which a pose shows the body add to what is known.
+    pub(crate) fn is_view_open(
+        &self,
+        pose: &Pose,
+        root: &Vector3<f64>,
+        settings: &BodySizeSettings,
+    ) -> bool {
+        self.views.frames(SizeView::of(pose, root)) < settings.view_frames
     }
 
     /// Compares the girths of the `rest` body with those of half a second before; to be called after each new frame.
@@ -142,7 +145,8 @@ fn store(model: &TrackerModel, x: &DVector<f64>, shape: &mut BodyShape) {
 }
 
 /// Data and prior: (Λ + P) x = η, with eq. 23 in P.
-fn solve(model: &TrackerModel, mut h: DMatrix<f64>, g: DVector<f64>) -> Option<DVector<f64>> {
+fn solve(model: &TrackerModel, data: SizeInformation) -> Option<DVector<f64>> {
+    let mut h = data.information;
     let settings = &model.config.shape.size;
     let has_space = model.directions.iter().any(|d| d.bone.is_none());
     let deviation = settings.scale_deviations[usize::from(!has_space)];
@@ -160,7 +164,7 @@ fn solve(model: &TrackerModel, mut h: DMatrix<f64>, g: DVector<f64>) -> Option<D
         h[(a, b)] -= w;
         h[(b, a)] -= w;
     }
-    let x = h.cholesky()?.solve(&g);
+    let x = h.cholesky()?.solve(&data.evidence);
     x.iter().all(|v| v.is_finite()).then_some(x)
 }
 
@@ -406,6 +410,17 @@ mod tests {
         assert_eq!(settled.first(), Some(&(3 * frames)));
         // It never becomes unsettled again.
         assert_eq!(settled.len() as u32, frames + 1);
+    }
+
+    #[test]
+    fn a_known_size_takes_no_more_frames() {
+        let model = TestScene::new(50, 480).model;
+        let settings = &model.config.shape.size;
+        let pose = TestScene::new(50, 480).pose;
+        let root = pose.root.iso().translation.vector;
+        let is_open = |size: SizeEstimate| size.is_view_open(&pose, &root, settings);
+        assert!(is_open(SizeEstimate::default()));
+        assert!(!is_open(SizeEstimate::known(60)));
     }
 
     #[test]
