@@ -60,12 +60,22 @@ struct FloorRow {
     weight: f64,
 }
 
-/// True for a joint whose cell has a reading of anything: it follows readings instead of the floor.
+/// Depth behind a reading from which a joint is hidden by it, metres: twice the radius of a limb.
+const HIDDEN: f32 = 0.15;
+
+/// True for a joint whose cell has a reading of the subject, or of something not before it: it follows readings instead of the
+/// floor.
 pub fn is_in_view(grid: &OrganisedCloud, joint: &P3d) -> bool {
-    let home = grid
-        .cell_of(&joint.cast())
-        .and_then(|(u, v)| grid.cell(u, v));
-    home.is_some_and(|k| grid.labels[k] != Label::Unknown)
+    let joint = joint.cast::<f32>();
+    let home = grid.cell_of(&joint).and_then(|(u, v)| grid.cell(u, v));
+    home.is_some_and(|k| {
+        let is_before = grid.depth[k] > 0.0 && grid.depth[k] < joint.z - HIDDEN;
+        match grid.labels[k] {
+            Label::Unknown => false,
+            Label::Person => true,
+            Label::Background | Label::Floor | Label::Other => !is_before,
+        }
+    })
 }
 
 impl FloorResidual<'_> {
@@ -158,7 +168,25 @@ impl Residual for FloorResidual<'_> {
 mod tests {
     use super::*;
     use crate::registration::residual::check::Chain;
-    use tryon_geometry::camera::Intrinsics;
+    use tryon_geometry::camera::{DepthImage, Intrinsics};
+
+    #[test]
+    fn a_joint_behind_a_reading_is_hidden() {
+        let camera = Intrinsics::KINECT_V1;
+        let mut depth = DepthImage::empty(camera.width, camera.height);
+        depth.data_mut().fill(2000);
+        let mut grid = OrganisedCloud::new(&camera, None);
+        grid.sample(&depth, 8.0);
+        grid.labels.fill(Label::Floor);
+        for (z, is_seen) in [(1.9, true), (2.1, true), (2.3, false)] {
+            assert_eq!(is_in_view(&grid, &P3d::new(0.1, 0.2, z)), is_seen, "{z} m");
+        }
+        let behind = P3d::new(0.1, 0.2, 2.3);
+        for (label, is_seen) in [(Label::Unknown, false), (Label::Person, true)] {
+            grid.labels.fill(label);
+            assert_eq!(is_in_view(&grid, &behind), is_seen, "{label:?}");
+        }
+    }
 
     #[test]
     fn derivatives_match_finite_differences() {
