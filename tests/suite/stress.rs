@@ -312,7 +312,7 @@ fn straight_limbs_and_an_arm_along_the_view_are_steady() {
         "static picture: {:.2} mm from frame to frame, {turned:.2} rad at most",
         jitter * 1e3
     );
-    assert!(turned < 0.5 && jitter < 1e-3);
+    assert!(turned < 0.5 && jitter < 1.5e-3);
 }
 
 #[test]

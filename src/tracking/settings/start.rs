@@ -57,6 +57,9 @@ settings! {
         pub heavy: f32 = 0.35,
         /// Distance beyond which it does, metres: a third of the proposed hands are wrong, and right ones lie within 10 cm.
         pub far: f64 = 0.25,
+        /// Cost of a start for each hand or foot that is far from its proposals, as a share. Larger believes the part network
+        /// above the readings.
+        pub disputed_cost: f64 = 0.15,
         /// Factor on the cost that a limb elsewhere undercuts. 1 moves limbs by noise.
         pub cheaper: f64 = 0.98,
         /// Turn from a pose of a moment ago beyond which another must be clearly better, radians: nobody turns around

@@ -85,22 +85,30 @@ impl BodyProposals {
         bones: &BoneTransforms,
         is_detected: [bool; 2],
     ) -> bool {
-        let settings = &model.config.start.proposals;
-        let ends = [PartKind::Hand, PartKind::Foot].into_iter();
-        let sides = [BodySide::Left, BodySide::Right];
-        let ends = ends.flat_map(|kind| sides.map(|side| (kind, side)));
-        let is_open = |(kind, side): &(PartKind, BodySide)| {
-            *kind == PartKind::Foot || !is_detected[*side as usize]
-        };
-        let mut classes = ends.filter(is_open).map(|(kind, side)| kind.class(side));
-        classes.any(|class| {
-            let is_heavy = self.joints.of_class(class).any(|(_, w)| w > settings.heavy);
-            let Some(end) = model.part_classes.anchor_of(class, &bones.joints) else {
-                return false;
-            };
-            let is_far = |(p, _): (P3, f32)| (p.cast::<f64>() - end).norm() > settings.far;
-            is_heavy && self.joints.of_class(class).all(is_far)
-        })
+        disputed_ends(&self.joints, model, bones, is_detected) > 0
+    }
+
+    /// Factor on the cost of a start, whose bones and detected hands are in the scratch: 1, and more for each hand and foot
+    /// far from all its heavy proposals.
+    pub(crate) fn dispute_cost(
+        &self,
+        model: &TrackerModel,
+        pose: &Pose,
+        scratch: &FitScratch,
+    ) -> f64 {
+        let is_detected = scratch.terms.hands.map(|h| h.is_some());
+        let joints = self.joints_along(pose);
+        let disputed = disputed_ends(joints, model, &scratch.bones, is_detected);
+        1.0 + self.settings.disputed_cost * disputed as f64
+    }
+
+    /// Joints as seen, or exchanged for a pose that faces away from the facing.
+    fn joints_along(&self, pose: &Pose) -> &JointProposals {
+        if self.faces_away(pose) {
+            &self.flipped
+        } else {
+            &self.joints
+        }
     }
 
     /// The body at its proposed joints as seen, and in doubt of the facing otherwise; trunk by its joints or upright, each
@@ -163,13 +171,34 @@ impl BodyProposals {
         pose: &Pose,
         scratch: &mut FitScratch,
     ) -> Option<Pose> {
-        let joints = if self.faces_away(pose) {
-            &self.flipped
-        } else {
-            &self.joints
-        };
-        with_limbs(context, joints, pose, scratch)
+        with_limbs(context, self.joints_along(pose), pose, scratch)
     }
+}
+
+/// Number of hands and feet of `bones` that are far from all their heavy proposals, but detected hands.
+fn disputed_ends(
+    proposals: &JointProposals,
+    model: &TrackerModel,
+    bones: &BoneTransforms,
+    is_detected: [bool; 2],
+) -> usize {
+    let settings = &model.config.start.proposals;
+    let ends = [PartKind::Hand, PartKind::Foot].into_iter();
+    let sides = [BodySide::Left, BodySide::Right];
+    let ends = ends.flat_map(|kind| sides.map(|side| (kind, side)));
+    let is_open = |(kind, side): &(PartKind, BodySide)| {
+        *kind == PartKind::Foot || !is_detected[*side as usize]
+    };
+    let is_disputed = |class: &u8| {
+        let is_heavy = proposals.of_class(*class).any(|(_, w)| w > settings.heavy);
+        let Some(end) = model.part_classes.anchor_of(*class, &bones.joints) else {
+            return false;
+        };
+        let is_far = |(p, _): (P3, f32)| (p.cast::<f64>() - end).norm() > settings.far;
+        is_heavy && proposals.of_class(*class).all(is_far)
+    };
+    let classes = ends.filter(is_open).map(|(kind, side)| kind.class(side));
+    classes.filter(is_disputed).count()
 }
 
 /// Rotation of an upright body with a given front, made level; one along the view is taken for the camera's −z.

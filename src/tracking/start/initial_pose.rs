@@ -131,6 +131,12 @@ pub(crate) fn initial_pose(
     let terms = FitTerms::hypothesis(&context.model.config.fit);
     let proposed = scratch.with_terms(terms, |s| prior.proposals.poses(context, s));
     let mut best = prior.best(context, proposed, scratch);
+    if let Some(start) = &best {
+        scratch.draw(context, &start.pose);
+        let pulled = scratch.with_terms(terms, |s| prior.proposals.pulled(context, &start.pose, s));
+        let other = prior.best(context, pulled.into_iter().collect(), scratch);
+        best = cheaper(best, other);
+    }
     let is_poor = |b: &FittedStart| b.fit.cost > settings.poor;
     if prior.proposals.is_doubtful() || best.as_ref().is_none_or(is_poor) {
         let proposed = best.as_ref().filter(|_| !prior.proposals.is_doubtful());
@@ -138,12 +144,15 @@ pub(crate) fn initial_pose(
         let searched =
             scratch.with_terms(terms, |s| searched(context, outline, prior.up, proposed, s));
         let other = prior.best(context, searched, scratch);
-        best = best
-            .into_iter()
-            .chain(other)
-            .min_by(|a, b| a.cost.total_cmp(&b.cost));
+        best = cheaper(best, other);
     }
     best.map(|b| (b.pose, b.fit))
+}
+
+/// The start of less cost.
+fn cheaper(a: Option<FittedStart>, b: Option<FittedStart>) -> Option<FittedStart> {
+    let starts = a.into_iter().chain(b);
+    starts.min_by(|a, b| a.cost.total_cmp(&b.cost))
 }
 
 impl StartPrior<'_> {
@@ -158,7 +167,8 @@ impl StartPrior<'_> {
         let fitted = |mut pose: Pose| {
             fit_pose(context, &mut pose, &context.model.config.fit.start, scratch);
             let fit = evaluate(context, &pose, settings.reach[1], scratch);
-            let cost = fit.cost * self.proposals.prior_cost(&pose, self.recent);
+            let dispute = self.proposals.dispute_cost(context.model, &pose, scratch);
+            let cost = fit.cost * self.proposals.prior_cost(&pose, self.recent) * dispute;
             FittedStart { cost, pose, fit }
         };
         let fitted = poses.into_iter().map(fitted);
