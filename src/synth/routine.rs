@@ -19,6 +19,8 @@ pub enum Routine {
     Turn,
     /// Walks a figure of eight: to either side, 1.8 to 3.2 m from a camera 2.4 m away.
     Walk,
+    /// Walks up to the camera, from 2 m behind the start to 0.6 m before it, and stands.
+    Approach,
     /// Stands still in the calibration pose.
     Still,
     /// A posture held without breath or sway.
@@ -184,6 +186,14 @@ const WALK: [Key; 12] = [
     key(15.8, FRONT, [A; 2]),
 ];
 
+/// Up to the camera.
+const APPROACH: [Key; 4] = [
+    key_at(0.0, [0.0, -2.0], FRONT, [DOWN; 2]),
+    key_at(0.3, [0.0, -2.0], FRONT, [DOWN; 2]),
+    key_at(3.1, [0.0, 0.6], FRONT, [DOWN; 2]),
+    key_at(8.0, [0.0, 0.6], FRONT, [DOWN; 2]),
+];
+
 /// Rises from 0 to 1 with speed and acceleration zero at both ends.
 pub(super) fn ease(x: f64) -> f64 {
     let t = x.clamp(0.0, 1.0);
@@ -215,6 +225,7 @@ impl Routine {
             Self::LeaveAndReturn => &LEAVE,
             Self::Turn => &TURN,
             Self::Walk => &WALK,
+            Self::Approach => &APPROACH,
             Self::Still | Self::Hold(_) | Self::Empty => &TRY_ON[..1],
         }
     }

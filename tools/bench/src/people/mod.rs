@@ -4,6 +4,8 @@ mod bars;
 mod bodies;
 mod common_joints;
 mod contact_sheet;
+mod crossing;
+mod facing;
 mod limb;
 mod person;
 pub(crate) mod plan;
@@ -26,9 +28,11 @@ use contact_sheet::ContactSheet;
 use std::path::Path;
 
 /// Names of all rows, in the order of the table, each with the folder below the data that it needs.
-pub const ROWS: [(&str, Option<&str>); 8] = [
+pub const ROWS: [(&str, Option<&str>); 10] = [
     ("unlike", Some(bodies::FOLDER)),
     ("shops", None),
+    ("crossing", None),
+    ("facing", None),
     ("poses", None),
     ("sides", None),
     ("limb", None),
@@ -96,6 +100,12 @@ fn measure(
             unlike::measure(plan, recorded, &people, sheet)
         }
         "shops" => Ok(shops::measure(settings, &plan.cases(shops::ROOMS), sheet)),
+        "crossing" => Ok(crossing::measure(
+            settings,
+            &plan.cases(crossing::CASES),
+            sheet,
+        )),
+        "facing" => Ok(facing::measure(settings, &plan.cases(facing::ROOMS), sheet)),
         "limb" => Ok(limb::measure(settings, &plan.cases(limb::CASES), sheet)),
         "poses" => Ok(poses::measure(settings, &people()?, sheet)),
         "sides" => Ok(sides::measure(settings, &people()?, sheet)),

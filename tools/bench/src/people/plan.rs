@@ -11,7 +11,7 @@ pub struct PeoplePlan {
     /// Folder with bodies, motions and recordings; without it their rows are skipped.
     #[arg(long, value_name = "DIR")]
     pub data: Option<PathBuf>,
-    /// Only these rows: unlike, shops, poses, sides, limb, stills, shared, uva.
+    /// Only these rows: unlike, shops, crossing, facing, poses, sides, limb, stills, shared, uva.
     #[arg(long, value_name = "NAME", value_delimiter = ',')]
     pub only: Vec<String>,
     /// A fraction of the cases of each row: two minutes instead of many.

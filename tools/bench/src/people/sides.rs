@@ -1,7 +1,8 @@
-//! Row `sides`: the heading of standing people found from nothing at eight yaws, and the size suggested from each.
+//! Row `sides`: the heading of standing people found from nothing at eight yaws, and the size suggested from each, before and
+//! after they turn around once.
 
 use super::bars::{Bar, greatest, percent};
-use super::common_joints::heading_error;
+use super::common_joints::{Points, heading_error};
 use super::contact_sheet::ContactSheet;
 use super::person::Person;
 use super::session::TrackedSession;
@@ -12,30 +13,35 @@ use tryon_body::embedded;
 use tryon_body::measure::measure as tape;
 use tryon_dressing::suggest;
 use tryon_garment::Size;
-use tryon_geometry::camera::NoiseModel;
+use tryon_geometry::camera::{DepthImage, NoiseModel};
 use tryon_geometry::math::V3d;
 use tryon_synth::{Posture, Room, Routine, Sequence, Setting};
 
 /// Yaws from which each person is seen.
 const SIDES: usize = 8;
+/// Frames of a turn: 3.2 s.
+const TURN: usize = 96;
 /// Frames until size and shape no longer change, with a margin.
 const FRAMES: u64 = 72;
 /// Garment whose size is suggested.
 const GARMENT: &str = "tshirt";
+
+/// Size and girth of the chest, metres.
+type Fit = (Size, f64);
 
 /// Result of one side.
 struct SideView {
     is_live: bool,
     /// Heading against the truth, radians.
     heading: f64,
-    /// Suggested size and girth of the chest, metres.
-    size: Option<(Size, f64)>,
+    /// Fits before and after a turn.
+    fits: [Option<Fit>; 2],
 }
 
-fn setting(index: usize, side: usize) -> Setting {
+fn setting(index: usize, yaw: f64) -> Setting {
     Setting {
         world_from_camera: Setting::tilted(1.1, 4.0, 0.0),
-        turn: TAU * side as f64 / SIDES as f64,
+        turn: yaw,
         room: Some(Room::default()),
         noise: [NoiseModel::KinectV1, NoiseModel::TimeOfFlight][index % 2],
         routine: Routine::Hold(Posture::Standing),
@@ -45,30 +51,126 @@ fn setting(index: usize, side: usize) -> Setting {
     }
 }
 
-fn side(person: &Person, setting: Setting, sheet: &mut ContactSheet) -> SideView {
-    let sequence = Sequence::new(person.actor.clone(), setting);
-    let (surface, truth) = sequence.surface_depth(0);
-    let truth = person.points(&truth);
-    let set = sequence.setting();
-    let picture = |i| set.noise.apply(&set.camera, &surface, set.seed, i);
-    let template = embedded::template();
-    let mut session = TrackedSession::new(&template, sequence.calibration());
-    let mut found = None;
-    for i in 0..FRAMES {
-        found = session.track(picture(i));
+/// A person on a turntable: depth without noise and joints at each step of a turn.
+struct Turntable {
+    steps: Vec<(Sequence, Vec<f32>, Points)>,
+}
+
+impl Turntable {
+    fn new(index: usize, person: &Person) -> Self {
+        let step = |k: usize| {
+            let yaw = TAU * k as f64 / TURN as f64;
+            let sequence = Sequence::new(person.actor.clone(), setting(index, yaw));
+            let (surface, truth) = sequence.surface_depth(0);
+            (sequence, surface, person.points(&truth))
+        };
+        Self {
+            steps: (0..TURN).map(step).collect(),
+        }
     }
-    sheet.add(&set.camera, &picture(0), Some(&truth), found.as_ref());
-    let up = set.world_from_camera.inverse().vector(&V3d::y());
-    let rest = template.personalise(&session.state.shape);
-    let size = || {
-        let measures = tape(&template, &rest).ok()?;
-        let suggestion = suggest(GARMENT, &measures).ok()?;
-        Some((suggestion.size, measures.chest))
-    };
-    SideView {
-        is_live: found.is_some(),
-        heading: found.map_or(f64::NAN, |f| heading_error(&f, &truth, &up)),
-        size: if found.is_some() { size() } else { None },
+
+    /// Picture of a step with the noise of frame `i`.
+    fn picture(&self, step: usize, i: u64) -> DepthImage {
+        let (sequence, surface, _) = &self.steps[step % TURN];
+        let set = sequence.setting();
+        set.noise.apply(&set.camera, surface, set.seed, i)
+    }
+
+    /// The person found at a side, and then turned around once.
+    fn side(&self, side: usize, sheet: &mut ContactSheet) -> SideView {
+        let first = side * TURN / SIDES;
+        let (sequence, _, truth) = &self.steps[first];
+        let set = sequence.setting();
+        let mut session = TrackedSession::new(&embedded::template(), sequence.calibration());
+        let mut found = None;
+        for i in 0..FRAMES {
+            found = session.track(self.picture(first, i));
+        }
+        sheet.add(
+            &set.camera,
+            &self.picture(first, 0),
+            Some(truth),
+            found.as_ref(),
+        );
+        let before = found.and_then(|_| fit(&session));
+        let mut is_live = false;
+        for k in 1..=TURN {
+            is_live = session.advance(self.picture(first + k, FRAMES + k as u64));
+        }
+        let up = set.world_from_camera.inverse().vector(&V3d::y());
+        SideView {
+            is_live: found.is_some(),
+            heading: found.map_or(f64::NAN, |f| heading_error(&f, truth, &up)),
+            fits: [before, is_live.then(|| fit(&session)).flatten()],
+        }
+    }
+}
+
+/// Size of the garment and girth of the chest of the tracked body.
+fn fit(session: &TrackedSession) -> Option<Fit> {
+    let template = session.model.template();
+    let measures = tape(template, &template.personalise(&session.state.shape)).ok()?;
+    let suggestion = suggest(GARMENT, &measures).ok()?;
+    Some((suggestion.size, measures.chest))
+}
+
+/// True girth of the chest, metres; `None` for a body that the tape cannot measure.
+fn chest(person: &Person) -> Option<f64> {
+    let actor = &person.actor;
+    let rest = actor.template.personalise(&actor.shape);
+    Some(tape(&actor.template, &rest).ok()?.chest)
+}
+
+/// Fits of people from all sides.
+#[derive(Default)]
+struct SideFits {
+    same: Vec<bool>,
+    differing: Vec<(String, f64)>,
+    ranges: Vec<f64>,
+    /// Of all sides, millimetres.
+    errors: Vec<(String, f64)>,
+}
+
+impl SideFits {
+    /// Adds the fits of a person from all sides; `chest` is the true girth, metres.
+    fn add(&mut self, name: &str, chest: Option<f64>, fits: impl Iterator<Item = Option<Fit>>) {
+        let fits: Vec<Fit> = fits.flatten().collect();
+        let off = fits.iter().filter_map(|f| Some(1e3 * (f.1 - chest?).abs()));
+        self.errors.extend(off.map(|mm| (name.to_owned(), mm)));
+        let is_same = fits.len() == SIDES && fits.iter().all(|f| f.0 == fits[0].0);
+        self.same.push(is_same);
+        let chests = || fits.iter().map(|f| f.1 * 1e3);
+        let range = chests().fold(f64::MIN, f64::max) - chests().fold(f64::MAX, f64::min);
+        self.ranges.push(range);
+        if !is_same {
+            let text: Vec<String> = fits.iter().map(|f| f.0.to_string()).collect();
+            let name = format!("{name} ({})", text.join(" "));
+            self.differing.push((name, range));
+        }
+    }
+
+    fn bars(self, when: &str) -> [Bar; 3] {
+        let count = self.same.len();
+        let errors: Vec<f64> = self.errors.iter().map(|e| e.1).collect();
+        [
+            Bar::new(
+                format!("error of the chest girth{when}, median [mm]"),
+                median(&errors),
+                errors.len(),
+            )
+            .worst(greatest(self.errors, " mm")),
+            Bar::new(
+                format!("same T-shirt size from all sides{when} [% of people]"),
+                percent(self.same),
+                count,
+            )
+            .worst(greatest(self.differing, " mm of chest")),
+            Bar::new(
+                format!("range of the chest girth over the sides{when}, median [mm]"),
+                median(&self.ranges),
+                count,
+            ),
+        ]
     }
 }
 
@@ -78,12 +180,11 @@ pub(super) fn measure(
     people: &[Person],
     sheet: &mut ContactSheet,
 ) -> Vec<Bar> {
-    let (mut right, mut wrong, mut same) = (Vec::new(), Vec::new(), Vec::new());
-    let (mut differing, mut spread) = (Vec::new(), Vec::new());
+    let (mut right, mut wrong) = (Vec::new(), Vec::new());
+    let mut fits = [SideFits::default(), SideFits::default()];
     for (index, person) in people.iter().enumerate() {
-        let sides: Vec<SideView> = (0..SIDES)
-            .map(|k| side(person, setting(index, k), sheet))
-            .collect();
+        let turntable = Turntable::new(index, person);
+        let sides: Vec<SideView> = (0..SIDES).map(|k| turntable.side(k, sheet)).collect();
         for (k, s) in sides.iter().enumerate() {
             let is_right = s.is_live && s.heading < FRAC_PI_4;
             right.push(is_right);
@@ -96,31 +197,16 @@ pub(super) fn measure(
                 wrong.push((format!("{} from {}°", person.name, 45 * k), off));
             }
         }
-        let sizes: Vec<Size> = sides.iter().filter_map(|s| Some(s.size?.0)).collect();
-        let is_same = sizes.len() == SIDES && sizes.iter().all(|s| *s == sizes[0]);
-        same.push(is_same);
-        let chests: Vec<f64> = sides.iter().filter_map(|s| Some(s.size?.1 * 1e3)).collect();
-        let range = chests.iter().copied().fold(f64::MIN, f64::max)
-            - chests.iter().copied().fold(f64::MAX, f64::min);
-        spread.push(range);
-        if !is_same {
-            let text: Vec<String> = sizes.iter().map(ToString::to_string).collect();
-            differing.push((format!("{} ({})", person.name, text.join(" ")), range));
+        for (when, fits) in fits.iter_mut().enumerate() {
+            let of_sides = sides.iter().map(|s| s.fits[when]);
+            fits.add(&person.name, chest(person), of_sides);
         }
     }
-    let (sides, count) = (right.len(), people.len());
-    vec![
-        Bar::new("facing right, live [%]", percent(right), sides).worst(greatest(wrong, "°")),
-        Bar::new(
-            "same T-shirt size from all sides [% of people]",
-            percent(same),
-            count,
-        )
-        .worst(greatest(differing, " mm of chest")),
-        Bar::new(
-            "range of the chest girth over the sides, median [mm]",
-            median(&spread),
-            count,
-        ),
-    ]
+    let sides = right.len();
+    let facing = Bar::new("facing right, live [%]", percent(right), sides);
+    let [before, after] = fits;
+    let mut bars = vec![facing.worst(greatest(wrong, "°"))];
+    bars.extend(before.bars(""));
+    bars.extend(after.bars(" after a turn"));
+    bars
 }
