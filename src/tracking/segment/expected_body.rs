@@ -54,8 +54,8 @@ impl ExpectedBody<'_> {
         covering.max_by(|a, b| of(a).total_cmp(&of(b)).then(b.id.cmp(&a.id)))
     }
 
-    /// Components with a cell in four near the body, across the view and in depth: its limbs, not who passes before it. All
-    /// where nothing is expected. Shape `[components]`.
+    /// Components near the body, across the view and in depth: its limbs, not who passes before it. All where nothing is
+    /// expected. Shape `[components]`.
     pub(super) fn own(self, cloud: &OrganisedCloud, map: &ComponentMap) -> Vec<bool> {
         if self.depth.is_empty() {
             return vec![true; map.list.len()];
@@ -66,7 +66,8 @@ impl ExpectedBody<'_> {
                 near[*id as usize] += 1;
             }
         }
-        let own = |c: &Component| 4 * near[c.id as usize] >= c.cells;
+        let share = self.settings.own_share;
+        let own = |c: &Component| near[c.id as usize] as f32 >= share * c.cells as f32;
         map.list.iter().map(own).collect()
     }
 

@@ -127,6 +127,9 @@ settings! {
         /// Distance from the expected body, across the view, within which cells then stay the person's, metres: a fast hand
         /// moves by 0.1 between two frames.
         pub around: f32 = 0.15,
+        /// Share of a component's cells near the expected body from which it may be a limb of it. Smaller takes who passes for
+        /// one, larger leaves hands that move fast.
+        pub own_share: f32 = 0.25,
         /// Area of an expected body below which nothing is split, m²: a head alone.
         pub least_area: f32 = 0.08,
     }

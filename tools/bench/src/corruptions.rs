@@ -1,13 +1,40 @@
 //! Corruptions of a depth sequence: noise, lost readings, dropped frames, occlusion, clipping.
 
+use super::segment::distance_from_segment;
 use super::{DepthScene, SceneTruth};
 use rand::Rng;
 use rand_pcg::Pcg32;
-use tryon_geometry::camera::DepthImage;
+use tryon_geometry::camera::{DepthImage, Intrinsics};
 use tryon_geometry::math::{P3, P3d};
 
 /// Seed of the corrupted pixels.
 const SEED: u64 = 41;
+
+/// Visits the readings of an image; `f` receives the pixel's point at a depth (m), and the reading.
+fn each_point(
+    image: &mut DepthImage,
+    camera: &Intrinsics,
+    f: impl Fn(&dyn Fn(f32) -> P3, &mut u16),
+) {
+    for (k, d) in image.data_mut().iter_mut().enumerate() {
+        let (u, v) = (k as u32 % camera.width, k as u32 / camera.width);
+        f(&|z| camera.unproject(u as f32, v as f32, z), d);
+    }
+}
+
+/// Takes away the readings within `radius` of a segment (camera frame, metres).
+pub(crate) fn drop_returns(
+    image: &mut DepthImage,
+    camera: &Intrinsics,
+    segment: &[P3; 2],
+    radius: f32,
+) {
+    each_point(image, camera, |point, d| {
+        if distance_from_segment(&point(f32::from(*d) * 1e-3), segment) < radius {
+            *d = 0;
+        }
+    });
+}
 
 impl DepthScene {
     fn each_pixel(mut self, mut f: impl FnMut(&mut Pcg32, &mut u16)) -> Self {
@@ -19,12 +46,12 @@ impl DepthScene {
         self
     }
 
-    /// Changes readings by the true places of some joints; `f` receives the places, the pixel's point at a depth (m), and the
-    /// reading. Frames without truth keep their readings, as do all frames if the scene lacks a joint.
-    fn each_pixel_by<const N: usize>(
+    /// Changes depth images by the true places of some joints. Frames without truth keep their readings, as do all frames if
+    /// the scene lacks a joint.
+    fn each_image_by<const N: usize>(
         mut self,
         names: [&str; N],
-        f: impl Fn(&[P3d; N], &dyn Fn(f32) -> P3, &mut u16),
+        f: impl Fn(&[P3d; N], &mut DepthImage, &Intrinsics),
     ) -> Self {
         let find = |name: &str| self.joint_names.iter().position(|m| m == name);
         let found: Vec<usize> = names.iter().filter_map(|n| find(n)).collect();
@@ -33,13 +60,8 @@ impl DepthScene {
         };
         let camera = self.calibration.depth;
         for (frame, truth) in self.frames.iter_mut().zip(&self.truth) {
-            if truth.joints.is_empty() {
-                continue;
-            }
-            let places = joints.map(|j| truth.joints[j]);
-            for (k, d) in frame.depth.data_mut().iter_mut().enumerate() {
-                let (u, v) = (k as u32 % camera.width, k as u32 / camera.width);
-                f(&places, &|z| camera.unproject(u as f32, v as f32, z), d);
+            if !truth.joints.is_empty() {
+                f(&joints.map(|j| truth.joints[j]), &mut frame.depth, &camera);
             }
         }
         self
@@ -95,35 +117,28 @@ impl DepthScene {
     /// Readings within `radius` (metres) of the line between two joints give no return, as black sleeves do.
     #[must_use]
     pub fn without_return(self, from: &str, to: &str, radius: f32) -> Self {
-        self.each_pixel_by([from, to], |ends, point, d| {
-            if *d == 0 {
-                return;
-            }
-            let [a, b] = ends.map(|p| p.cast::<f32>());
-            let along = b - a;
-            let p = point(f32::from(*d) * 1e-3);
-            let t = (p - a).dot(&along) / along.norm_squared().max(f32::MIN_POSITIVE);
-            if (p - (a + along * t.clamp(0.0, 1.0))).norm() < radius {
-                *d = 0;
-            }
+        self.each_image_by([from, to], |ends, image, camera| {
+            drop_returns(image, camera, &ends.map(|p| p.cast()), radius);
         })
     }
 
     /// Puts a ball of `radius` (metres) in front of a joint.
     #[must_use]
     pub fn holding(self, joint: &str, radius: f64) -> Self {
-        self.each_pixel_by([joint], |[hand], point, d| {
+        self.each_image_by([joint], |[hand], image, camera| {
             let centre = hand.coords - hand.coords.normalize() * radius;
-            let ray = point(1.0).coords.cast::<f64>();
-            // Nearer root of |t ray − centre| = radius; t is the depth, as the ray has z = 1.
-            let (a, b) = (ray.norm_squared(), ray.dot(&centre));
-            let disc = b * b - a * (centre.norm_squared() - radius * radius);
-            if disc > 0.0 {
-                let mm = ((b - disc.sqrt()) / a * 1e3).round();
-                if mm > 0.0 && mm < f64::from(u16::MAX) && (*d == 0 || mm < f64::from(*d)) {
-                    *d = mm as u16;
+            each_point(image, camera, |point, d| {
+                let ray = point(1.0).coords.cast::<f64>();
+                // Nearer root of |t ray − centre| = radius; t is the depth, as the ray has z = 1.
+                let (a, b) = (ray.norm_squared(), ray.dot(&centre));
+                let disc = b * b - a * (centre.norm_squared() - radius * radius);
+                if disc > 0.0 {
+                    let mm = ((b - disc.sqrt()) / a * 1e3).round();
+                    if mm > 0.0 && mm < f64::from(u16::MAX) && (*d == 0 || mm < f64::from(*d)) {
+                        *d = mm as u16;
+                    }
                 }
-            }
+            });
         })
     }
 

@@ -44,6 +44,7 @@ pub mod people;
 pub mod rest;
 pub mod scans;
 pub mod scenes;
+mod segment;
 mod sheet;
 mod table;
 pub mod tracking;

@@ -2,6 +2,7 @@
 
 use super::settings::CaptureBenchSettings;
 use crate::scans::TrueGarment;
+use crate::segment::distance_from_segment;
 use tryon_clothcap::multi::Ring;
 use tryon_geometry::math::P3;
 use tryon_geometry::mesh::boundary_edges;
@@ -50,12 +51,6 @@ pub(super) fn distance_from_rings(points: &[P3], rings: &[Ring], vertices: &[P3]
         all.reduce(f32::min).unwrap_or(0.0)
     };
     points.iter().map(|p| f64::from(distance(p))).sum::<f64>() / points.len().max(1) as f64
-}
-
-fn distance_from_segment(p: &P3, [a, b]: &[P3; 2]) -> f32 {
-    let along = b - a;
-    let t = (p - a).dot(&along) / along.norm_squared().max(f32::MIN_POSITIVE);
-    (a + along * t.clamp(0.0, 1.0) - p).norm()
 }
 
 #[cfg(test)]

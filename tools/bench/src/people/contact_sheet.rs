@@ -1,6 +1,7 @@
 //! Contact sheets: shaded depth images with true and tracked joints, many in one picture.
 
 use super::common_joints::Points;
+use super::session::TrackedSession;
 use crate::{EvaluateError, Sheet};
 use std::path::Path;
 use tryon_geometry::camera::{DepthImage, Intrinsics};
@@ -61,6 +62,23 @@ impl ContactSheet {
             }
         }
         self.0.push(cell);
+    }
+
+    /// Tracks the next depth image of a session and adds it if `is_shown`; the common joints with a live pose.
+    pub(super) fn track(
+        &mut self,
+        session: &mut TrackedSession,
+        depth: DepthImage,
+        truth: Option<&Points>,
+        is_shown: bool,
+    ) -> Option<Points> {
+        let shown = is_shown.then(|| depth.clone());
+        let tracked = session.track(depth);
+        if let Some(depth) = shown {
+            let camera = &session.model.calibration().depth;
+            self.add(camera, &depth, truth, tracked.as_ref());
+        }
+        tracked
     }
 
     /// Writes the sheet; nothing without cells.

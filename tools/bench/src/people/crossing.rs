@@ -89,11 +89,7 @@ fn cross(settings: &PeopleSettings, case: usize, sheet: &mut ContactSheet) -> Cr
         });
         let set = room.setting();
         let image = set.noise.apply(&set.camera, &depth, set.seed, i);
-        let shown = SHOWN.contains(&i).then(|| image.clone());
-        let ours = session.track(image);
-        if let Some(image) = shown {
-            sheet.add(&set.camera, &image, truth.first(), ours.as_ref());
-        }
+        let ours = sheet.track(&mut session, image, truth.first(), SHOWN.contains(&i));
         match ours.and_then(|o| identity(&o, &truth, settings.near)) {
             Some(0) => kept += u64::from(i + LAST >= FRAMES),
             Some(_) => swapped += 1,

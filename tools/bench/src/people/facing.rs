@@ -7,6 +7,7 @@ use super::contact_sheet::ContactSheet;
 use super::person::Person;
 use super::session::TrackedSession;
 use super::settings::PeopleSettings;
+use crate::corruptions::drop_returns;
 use std::f64::consts::FRAC_PI_2;
 use tryon_body::embedded;
 use tryon_geometry::camera::{Calibration, DepthImage, Intrinsics};
@@ -22,7 +23,7 @@ const SHOWN: u64 = 60;
 /// Number of the first person's random shape.
 const FIRST_PERSON: usize = 400;
 /// Radius about the bones of the legs within which trousers give no return, metres.
-const TROUSERS: f64 = 0.16;
+const TROUSERS: f32 = 0.16;
 /// Hips, knees and ankles among the common joints, left and right.
 const LEGS: [[usize; 3]; 2] = [[6, 8, 10], [7, 9, 11]];
 
@@ -65,25 +66,12 @@ impl Case {
     }
 }
 
-/// Distance of a point from a segment, metres.
-fn distance(p: &P3d, a: &P3d, b: &P3d) -> f64 {
-    let d = b - a;
-    let t = ((p - a).dot(&d) / d.norm_squared().max(f64::MIN_POSITIVE)).clamp(0.0, 1.0);
-    (p - (a + d * t)).norm()
-}
-
 /// Takes the readings of the legs away.
 fn darken(image: &mut DepthImage, camera: &Intrinsics, person: &Points) {
-    for (i, z) in image.data_mut().iter_mut().enumerate() {
-        let (u, v) = (i as u32 % camera.width, i as u32 / camera.width);
-        let p = camera.unproject(u as f32, v as f32, f32::from(*z) * 1e-3);
-        let p = p.cast::<f64>();
-        let is_leg = LEGS.iter().any(|[hip, knee, ankle]| {
-            let [hip, knee, ankle] = [hip, knee, ankle].map(|j| &person[*j]);
-            distance(&p, hip, knee).min(distance(&p, knee, ankle)) < TROUSERS
-        });
-        if is_leg {
-            *z = 0;
+    for [hip, knee, ankle] in LEGS {
+        for bone in [[hip, knee], [knee, ankle]] {
+            let segment = bone.map(|j| person[j].cast());
+            drop_returns(image, camera, &segment, TROUSERS);
         }
     }
 }
@@ -106,12 +94,7 @@ fn face(settings: &PeopleSettings, case: Case, room: usize, sheet: &mut ContactS
         if matches!(case, Case::DarkTrousers) {
             darken(&mut image, &set.camera, &truth);
         }
-        let shown = (i == SHOWN).then(|| image.clone());
-        let ours = session.track(image);
-        if let Some(image) = shown {
-            sheet.add(&set.camera, &image, Some(&truth), ours.as_ref());
-        }
-        if let Some(ours) = ours {
+        if let Some(ours) = sheet.track(&mut session, image, Some(&truth), i == SHOWN) {
             out.live += 1;
             out.reversed += usize::from(heading_error(&ours, &truth, &up) > FRAC_PI_2);
         }

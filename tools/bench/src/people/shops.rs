@@ -115,12 +115,7 @@ fn visit(
     let mut last = None;
     for i in 0..FRAMES {
         let (depth, people) = picture(shop, &visitors, i);
-        let shown = (i == PICTURE).then(|| depth.clone());
-        let ours = session.track(depth);
-        if let Some(depth) = shown {
-            let camera = &shop.setting().camera;
-            sheet.add(camera, &depth, people.first(), ours.as_ref());
-        }
+        let ours = sheet.track(&mut session, depth, people.first(), i == PICTURE);
         let Some(ours) = ours else { continue };
         match identity(&ours, &people, settings.near) {
             None => out.astray += 1,

@@ -62,12 +62,8 @@ fn follow(person: &Person, sequence: &Sequence, sheet: &mut ContactSheet) -> Vec
     for i in FIRST..FIRST + FRAMES {
         let (frame, truth) = sequence.frame(i);
         let truth = person.points(&truth);
-        let picture = (i % PICTURE_INTERVAL == 0).then(|| frame.depth.clone());
-        let ours = session.track(frame.depth);
-        if let Some(depth) = picture {
-            let camera = &sequence.setting().camera;
-            sheet.add(camera, &depth, Some(&truth), ours.as_ref());
-        }
+        let is_shown = i % PICTURE_INTERVAL == 0;
+        let ours = sheet.track(&mut session, frame.depth, Some(&truth), is_shown);
         pairs.extend(ours.map(|o| (o, truth)));
     }
     pairs
