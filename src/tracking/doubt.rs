@@ -14,6 +14,7 @@ use crate::segment::CandidateBox;
 use crate::segment::part_network::YawBelief;
 use crate::settings::{AssessSettings, StepSettings};
 use crate::start::yaw_of_joints;
+use nalgebra::Vector3;
 use tryon_body::Pose;
 use tryon_geometry::math::Camera;
 
@@ -21,6 +22,7 @@ use tryon_geometry::math::Camera;
 pub(super) struct FittedSubject<'a> {
     pub view: SubjectView<'a>,
     pub candidate: Option<&'a CandidateBox>,
+    pub time_ns: u64,
     pub pose: &'a mut Pose<Camera>,
     pub fit: &'a mut FitReport,
 }
@@ -100,9 +102,26 @@ impl FittedSubject<'_> {
         let settings = &model.config.assess.facing;
         let joints = &workspace.fit.bones.joints;
         let yaw = yaw_of_joints(&model.part_classes, joints, &self.view.up.cast());
+        let forward = self.forward_speed(state, workspace);
         let belief = state.facing.get_or_insert(FacingBelief::NEW);
-        belief.update(yaw, votes, settings);
+        belief.update(yaw, forward, votes, settings);
         belief.verdict(settings) == FacingVerdict::Reversed
+    }
+
+    /// Speed of the pelvis along the level front since the last pose, m/s; 0 for a body just found.
+    fn forward_speed(&self, state: &TrackerState, workspace: &Workspace) -> f32 {
+        let passed = self.time_ns.saturating_sub(state.time_ns);
+        if !state.is_following() || state.pose_age > 0 || passed == 0 {
+            return 0.0;
+        }
+        let pelvis = workspace.body.rest.joints[0];
+        let [now, before] = [&*self.pose, &state.pose].map(|pose| pose.root.iso() * pelvis);
+        let up = self.view.up;
+        let front = self.pose.root.iso().rotation * Vector3::z();
+        let level = front - up * up.dot(&front);
+        let along = level.try_normalize(f64::EPSILON);
+        let moved = along.map_or(0.0, |front| front.dot(&(now - before)));
+        (moved * 1e9 / passed as f64) as f32
     }
 
     /// Replaces pose and fit by those of a body that faces as the body parts do; in doubt where no such body agrees with the

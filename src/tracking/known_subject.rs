@@ -1,13 +1,14 @@
-//! A subject with a body that was measured before: tracking goes on with it instead of measuring anew, and drops it when
-//! the person who is found is another.
+//! A subject with a body that was measured before, in this session before a loss or in an earlier one: tracking goes on with
+//! it instead of measuring anew, and drops it when the person who is found is another.
 //!
-//! Evidence of another person: a height that differs from that of the fitted body, a residual that stays far above the
-//! earlier one, or a fit that succeeds only with a new size.
+//! Evidence of another person: a height that differs from that of the fitted body, clothes of other colours, a residual that
+//! stays far above the earlier one, or a fit that succeeds only with a new size.
 
 use super::state::TrackerState;
 use super::status::LostReason;
 use super::subject::{StepLog, SubjectFrame};
 use super::workspace::Workspace;
+use crate::clothes_colors::ClothesColors;
 use crate::model::TrackerModel;
 use crate::shape::{KnownBody, Probation, SizeEstimate};
 
@@ -49,9 +50,16 @@ impl SubjectFrame<'_> {
         workspace: &mut Workspace,
         log: &mut StepLog,
     ) -> Result<(), LostReason> {
-        let Some(probation) = state.probation else {
-            return self.track(state, workspace, log);
-        };
+        let is_awaited = state.probation.is_some();
+        if !is_awaited && !state.is_following() {
+            let own = state.known_body(self.model);
+            state.probation = own.map(|k| Probation::begin(k.residual));
+        }
+        if state.probation.is_none() {
+            let tracked = self.track(state, workspace, log);
+            self.learn_clothes(state, workspace);
+            return tracked;
+        }
         let mut fresh = state.clone();
         fresh.reset(self.model);
         let tracked = self.track(state, workspace, log);
@@ -60,7 +68,14 @@ impl SubjectFrame<'_> {
             // In doubt: nothing is compared.
             return tracked;
         }
-        if is_live && !self.is_other(state, workspace, probation) {
+        // None: who was away for long is measured anew in any case.
+        let compared = state.probation;
+        let is_other = |probation| self.is_other(state, workspace, probation);
+        if is_live && !compared.is_some_and(is_other) {
+            return tracked;
+        }
+        if !is_live && !is_awaited {
+            state.probation = None;
             return tracked;
         }
         let measured = self.track(&mut fresh, workspace, log);
@@ -71,6 +86,25 @@ impl SubjectFrame<'_> {
         tracked
     }
 
+    /// Remembers the colours of a live subject's clothes.
+    fn learn_clothes(&self, state: &mut TrackerState, workspace: &Workspace) {
+        let settings = &self.model.config.assess.clothes;
+        let is_sure = state.status.is_live() && state.pose_age == 0 && state.disagreeing == 0;
+        if !is_sure || !state.frames.is_multiple_of(settings.interval.max(1)) {
+            return;
+        }
+        if let Some(seen) = self.clothes(workspace) {
+            let kept = state.clothes.get_or_insert_default();
+            kept.learn(&seen, settings);
+        }
+    }
+
+    /// Colours of the subject under the body that was drawn last.
+    fn clothes(&self, workspace: &Workspace) -> Option<ClothesColors> {
+        let image = &workspace.fit.pairing.image;
+        ClothesColors::of(self.model, self.frame, self.observation.grid, image)
+    }
+
     /// Adds a live frame to the comparison; true for another person.
     fn is_other(
         &self,
@@ -78,12 +112,22 @@ impl SubjectFrame<'_> {
         workspace: &mut Workspace,
         mut probation: Probation,
     ) -> bool {
-        if probation.frames == 0 && self.has_other_height(state, workspace) {
+        if probation.frames == 0
+            && (self.has_other_clothes(state, workspace) || self.has_other_height(state, workspace))
+        {
             return true;
         }
         let is_other = probation.compare(state.quality[1], &self.model.config.shape);
         state.probation = is_other.is_none().then_some(probation);
         is_other.unwrap_or(false)
+    }
+
+    /// The clothes have other colours than before the loss. False where either was not seen in colour.
+    fn has_other_clothes(&self, state: &TrackerState, workspace: &Workspace) -> bool {
+        let settings = &self.model.config.assess.clothes;
+        let both = state.clothes.as_ref().zip(self.clothes(workspace));
+        let likeness = both.and_then(|(kept, seen)| kept.likeness(&seen, settings));
+        likeness.is_some_and(|l| l < settings.least_likeness)
     }
 
     /// The fitted body ends elsewhere than the readings along the upright. False where these do not show a whole person.

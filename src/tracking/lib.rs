@@ -53,10 +53,12 @@
 //!
 //! Size and surface:
 //!
-//! - Bone scales and shape coefficients (eq. 18 to 23): [`mod@shape::size`]; by the side seen: [`mod@shape::view_information`].
+//! - Bone scales and shape coefficients (eq. 18 to 23): [`mod@shape::size`]; by the side seen: [`mod@shape::view_information`];
+//!   how sure it is: [`mod@shape::girth_deviation`].
 //! - In turns with the pose: [`mod@shape::calibration`].
 //! - Displacements (eq. 13 to 17): [`mod@shape::surface`], when they are due: [`mod@adaptation`].
-//! - Bodies that were measured before: [`mod@shape::known_body`], [`mod@shape::probation`], [`mod@known_subject`].
+//! - Bodies that were measured before: [`mod@shape::known_body`], [`mod@shape::probation`], [`mod@known_subject`]; by the
+//!   colour of their clothes: [`mod@clothes_colors`].
 #![allow(rustdoc::private_intra_doc_links)] // the index of ideas names private modules, `pub(crate)` for it
 
 mod adaptation;
@@ -64,6 +66,7 @@ mod assess;
 mod background_eye;
 mod block_readings;
 mod change_detection;
+mod clothes_colors;
 mod color_eye;
 mod doubt;
 mod fit;
@@ -96,7 +99,7 @@ pub use color_eye::{COLOR_INTERVAL, ColorEye, ColorEyeError};
 pub use model::{PartClasses, TrackerModel, part_classes};
 pub use report::{Skipped, StepError, StepReport, TrackingStagesMs};
 pub use settings::TrackerConfig;
-pub use shape::{KnownBody, ShapeFault, SizeEstimate, SurfaceStatistics};
+pub use shape::{GirthDeviations, KnownBody, ShapeFault, SizeEstimate, SurfaceStatistics};
 pub use sighting::ColorSighting;
 pub use start::{Facing, JointProposals, ProposedAnchor, facing, yaw_of_joints};
 pub use state::TrackerState;

@@ -1,6 +1,7 @@
 //! State of a tracker from frame to frame.
 
 use super::change_detection::DepthReference;
+use super::clothes_colors::ClothesColors;
 use super::own_motion::{StillSubject, StillThing};
 use super::status::{LostReason, Status};
 use crate::assess::{FacingBelief, PersonBelief, Seat};
@@ -48,6 +49,9 @@ pub struct TrackerState {
     /// Comparison with a body that was measured before, until it is over.
     #[serde(default)]
     pub(super) probation: Option<Probation>,
+    /// Colours of the subject's clothes; `None` before they were seen.
+    #[serde(default)]
+    pub(super) clothes: Option<ClothesColors>,
     pub(super) surface: SurfaceStatistics,
     pub(super) bad_frames: u32,
     /// Frames in a row in which the body disagreed with the frame.
@@ -132,6 +136,7 @@ impl TrackerState {
             interval_ns: 0,
             size: SizeEstimate::default(),
             probation: None,
+            clothes: None,
             surface: SurfaceStatistics::default(),
             bad_frames: 0,
             disagreeing: 0,

@@ -141,6 +141,9 @@ impl SubjectFrame<'_> {
         let config = &self.model.config;
         workspace.fit.pairing.forget();
         let found = !state.is_following();
+        if found && state.pose_age > settings.forget {
+            state.reset(self.model);
+        }
         let is_new = found && state.size.frames == 0;
         let before = size_before(state, found);
         let start = if found {
@@ -227,6 +230,7 @@ impl SubjectFrame<'_> {
         FittedSubject {
             view: self.view(),
             candidate: self.person.candidate.as_ref(),
+            time_ns: self.frame.time_ns,
             pose,
             fit,
         }
@@ -327,9 +331,6 @@ impl SubjectFrame<'_> {
     ) -> Result<Prediction, LostReason> {
         let settings = &self.model.config.step;
         workspace.fit.terms = FitTerms::start(&self.model.config.fit);
-        if state.pose_age > settings.forget {
-            state.reset(self.model);
-        }
         let outline = self.outline(state);
         let is_unknown = state.size.frames == 0 && self.model.config.adapt_size;
         let stature = outline.and_then(|o| o.stature).filter(|_| is_unknown);

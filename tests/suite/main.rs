@@ -18,6 +18,7 @@ mod offline_outfit;
 mod offline_steps;
 mod on_person;
 mod others;
+mod returning;
 mod seat;
 mod size;
 mod sleep;

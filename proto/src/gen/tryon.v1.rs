@@ -1755,6 +1755,20 @@ pub struct BodyState {
     /// person. 0 before the first.
     #[prost(uint64, tag = "16")]
     pub subject: u64,
+    /// How sure the girths of `shape` are; absent before the first and for a body that was measured in an earlier session.
+    #[prost(message, optional, tag = "17")]
+    pub girth_deviations: ::core::option::Option<GirthDeviations>,
+}
+/// Standard deviations of a body's girths, metres: wide while one side was seen, narrower after a turn.
+#[derive(Clone, Copy, PartialEq, ::prost::Message)]
+pub struct GirthDeviations {
+    #[prost(float, tag = "1")]
+    pub chest: f32,
+    /// Natural waist.
+    #[prost(float, tag = "2")]
+    pub waist: f32,
+    #[prost(float, tag = "3")]
+    pub hip: f32,
 }
 #[derive(Clone, PartialEq, ::prost::Message)]
 pub struct BodyPose {

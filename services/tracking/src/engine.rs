@@ -224,6 +224,12 @@ impl Engine {
             state.pose = Some(body::pose_to_wire(&self.state.pose));
             state.shape = Some(self.wire_shape.clone());
             state.shape_version = self.counts.shape_version;
+            let sure = self.state.girth_deviations(&self.model);
+            state.girth_deviations = sure.map(|d| v1::GirthDeviations {
+                chest: d.chest as f32,
+                waist: d.waist as f32,
+                hip: d.hip as f32,
+            });
         }
         state.world_from_camera = Some(geometry::rigid_to_wire(&self.state.world_from_camera));
         stages.push(stage("tracking.total", start));

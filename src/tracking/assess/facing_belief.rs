@@ -38,17 +38,21 @@ impl FacingBelief {
         }
     }
 
-    /// Adds a frame in which the pose has this yaw, radians. A body that lies has none: nothing speaks for its facing, or
-    /// against it.
+    /// Adds a frame in which the pose has this yaw, radians, and moves `forward`, along its front, m/s. A body that lies has
+    /// no yaw: nothing speaks for its facing, or against it.
     pub(crate) fn update(
         &mut self,
         yaw: Option<f64>,
+        forward: f32,
         votes: &YawBelief,
         settings: &FacingSettings,
     ) {
         match yaw {
             Some(yaw) => {
-                let odds = log_odds(yaw as f32, votes, settings);
+                let seen = log_odds(yaw as f32, votes, settings);
+                let walks = forward.abs() >= settings.walking;
+                let walked = f32::from(u8::from(walks)) * settings.walk.copysign(forward);
+                let odds = seen + walked;
                 let sum = settings.kept * self.log_odds + odds;
                 self.log_odds = sum.clamp(-settings.most, settings.most);
             }
@@ -115,7 +119,7 @@ mod tests {
         let front = votes([0.94, 0.02, 0.01, 0.0, 0.0, 0.0, 0.01, 0.02]);
         let verdict = |yaw: f64| {
             let mut belief = FacingBelief::NEW;
-            belief.update(Some(yaw), &front, &settings);
+            belief.update(Some(yaw), 0.0, &front, &settings);
             belief.verdict(&settings)
         };
         assert_eq!(verdict(0.0), FacingVerdict::Right);
@@ -134,12 +138,12 @@ mod tests {
         );
         let mut belief = FacingBelief::NEW;
         for _ in 0..5 {
-            belief.update(Some(0.0), &front, &settings);
+            belief.update(Some(0.0), 0.0, &front, &settings);
         }
-        belief.update(Some(0.0), &back, &settings);
+        belief.update(Some(0.0), 0.0, &back, &settings);
         assert_eq!(belief.verdict(&settings), FacingVerdict::Right);
         for _ in 0..3 {
-            belief.update(Some(0.0), &back, &settings);
+            belief.update(Some(0.0), 0.0, &back, &settings);
         }
         assert_eq!(belief.verdict(&settings), FacingVerdict::Reversed);
         belief.turn();
@@ -152,12 +156,30 @@ mod tests {
         for votes in [YawBelief::default(), votes([0.125; YAW_BINS])] {
             let mut belief = FacingBelief::NEW;
             for _ in 0..50 {
-                belief.update(Some(0.3), &votes, &settings);
+                belief.update(Some(0.3), 0.0, &votes, &settings);
             }
             assert_eq!(belief.verdict(&settings), FacingVerdict::Undecided);
         }
         let mut lying = FacingBelief::NEW;
-        lying.update(None, &votes([0.125; YAW_BINS]), &settings);
+        lying.update(None, 0.0, &votes([0.125; YAW_BINS]), &settings);
         assert_eq!(lying.verdict(&settings), FacingVerdict::Right);
+    }
+
+    #[test]
+    fn walking_tips_what_is_in_doubt_and_alone_decides_nothing() {
+        let settings = FacingSettings::default();
+        let front = votes([0.5, 0.1, 0.02, 0.03, 0.18, 0.07, 0.05, 0.05]);
+        let after = |forward: f32, votes: &YawBelief| {
+            let mut belief = FacingBelief::NEW;
+            for _ in 0..6 {
+                belief.update(Some(0.0), forward, votes, &settings);
+            }
+            belief.log_odds
+        };
+        let standing = after(0.1, &front);
+        assert_eq!(standing, after(0.0, &front), "a sway is no step");
+        assert!(after(0.9, &front) > standing && after(-0.9, &front) < standing);
+        let nothing = YawBelief::default();
+        assert!((0.5..settings.sure).contains(&after(0.9, &nothing)));
     }
 }

@@ -1,5 +1,6 @@
 //! Immutable parts of a tracker: settings, template with samples, limbs, trunk and classes, the rest body of a shape.
 
+mod girth_gradients;
 mod leg;
 mod limb;
 pub mod part_classes;

@@ -1,5 +1,6 @@
 //! Immutable part of a tracker: template, camera, sample points, limbs and priors.
 
+use super::girth_gradients::GirthGradients;
 use super::leg::{Leg, legs};
 use super::limb::{self, Limb};
 use super::part_classes::PartClasses;
@@ -8,7 +9,7 @@ use crate::segment::part_network::PartNetwork;
 use crate::settings::{Association, TrackerConfig};
 use nalgebra::{Point3, Vector3};
 use std::collections::BTreeMap;
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 use tryon_body::parts::{BodyPart, BodySegment, BodySide};
 use tryon_body::{JointMotion, SkinWeights, Template};
 use tryon_geometry::camera::Calibration;
@@ -46,6 +47,8 @@ pub struct TrackerModel {
     pub(crate) directions: Vec<Direction>,
     /// Pairs of directions with a prior on equal scales, and its weight (eq. 23).
     pub(crate) tied: Vec<(usize, usize, f64)>,
+    /// Gradients of the girths along `directions`, found on first use; `None` for a template without girths.
+    girth_gradients: OnceLock<Option<GirthGradients>>,
     /// Weight of the rest-pose prior of each angle.
     pub(crate) stiffness: Vec<f64>,
     /// Legs, for feet out of view.
@@ -144,6 +147,7 @@ impl TrackerModel {
             spacing,
             directions,
             tied,
+            girth_gradients: OnceLock::new(),
             stiffness,
             standing,
             trunk,
@@ -158,6 +162,15 @@ impl TrackerModel {
             seen_shares,
         }
     }
+    /// Gradients of the girths along the directions of size.
+    pub(crate) fn girth_gradients(&self) -> Option<&GirthGradients> {
+        let find = || {
+            let bones: Vec<Option<usize>> = self.directions.iter().map(|d| d.bone).collect();
+            GirthGradients::new(&self.template, &bones)
+        };
+        self.girth_gradients.get_or_init(find).as_ref()
+    }
+
     /// The same model for another camera, without the work of [`Self::new`].
     pub fn with_calibration(&self, calibration: Calibration) -> Self {
         Self {

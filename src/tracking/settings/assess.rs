@@ -23,6 +23,20 @@ settings! {
         pub sighting: SightingSettings = SightingSettings::default(),
         /// Seated or standing.
         pub seat: SeatSettings = SeatSettings::default(),
+        /// Colours of clothes.
+        pub clothes: ClothesColorSettings = ClothesColorSettings::default(),
+    }
+
+    /// Settings of the colours of clothes.
+    pub struct ClothesColorSettings {
+        /// Frames between two that are learnt: clothes keep their colours, and each costs 0.2 ms.
+        pub interval: u64 = 8,
+        /// Weight of a frame in the running mean. Larger learns who stands before the subject.
+        pub newest: f32 = 0.2,
+        /// Readings of a part below which its colours are noise.
+        pub least_readings: f32 = 60.0,
+        /// Likeness of the colours below which it is another person.
+        pub least_likeness: f32 = 0.5,
     }
 
     /// Settings of the joints' confidence.
@@ -94,6 +108,11 @@ settings! {
         /// Factor on the cost of a reversed pose up to which the one that faces as the body parts do replaces it: front and
         /// back fit nearly alike. Larger trusts the body parts above the fit.
         pub dearer: f64 = 2.0,
+        /// Log odds for the facing in whose direction a body walks, per frame: people walk backwards for a step or two. The
+        /// sum of a walk alone, five times this, decides nothing.
+        pub walk: f32 = 0.3,
+        /// Speed along its front from which a body walks, m/s. Smaller hears of a body that sways.
+        pub walking: f32 = 0.4,
     }
 
     /// Settings of sightings in colour.

@@ -12,8 +12,8 @@ mod step;
 mod tracker;
 
 pub use assess::{
-    AssessSettings, BeliefSettings, ConfidenceSettings, FacingSettings, SeatSettings,
-    SightingSettings,
+    AssessSettings, BeliefSettings, ClothesColorSettings, ConfidenceSettings, FacingSettings,
+    SeatSettings, SightingSettings,
 };
 pub use fit::{
     FitSettings, HandAssignmentSettings, PredictionSettings, Schedule, SeenJointSettings,

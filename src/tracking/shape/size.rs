@@ -100,6 +100,13 @@ impl SizeEstimate {
         self.views.frames(SizeView::of(pose, root)) < settings.view_frames
     }
 
+    /// Information of all frames so far and of the prior, per point, shape `[directions × directions]`; `None` before the
+    /// first frame.
+    pub(super) fn precision(&self, model: &TrackerModel) -> Option<DMatrix<f64>> {
+        let data = self.views.total(model.directions.len())?;
+        Some(with_prior(model, data.information))
+    }
+
     /// Compares the girths of the `rest` body with those of half a second before; to be called after each new frame.
     pub(crate) fn check_settled(&mut self, model: &TrackerModel, rest: &RestBody) {
         let settings = &model.config.shape.size;
@@ -146,7 +153,13 @@ fn store(model: &TrackerModel, x: &DVector<f64>, shape: &mut BodyShape) {
 
 /// Data and prior: (Λ + P) x = η, with eq. 23 in P.
 fn solve(model: &TrackerModel, data: SizeInformation) -> Option<DVector<f64>> {
-    let mut h = data.information;
+    let h = with_prior(model, data.information);
+    let x = h.cholesky()?.solve(&data.evidence);
+    x.iter().all(|v| v.is_finite()).then_some(x)
+}
+
+/// Λ + P.
+fn with_prior(model: &TrackerModel, mut h: DMatrix<f64>) -> DMatrix<f64> {
     let settings = &model.config.shape.size;
     let has_space = model.directions.iter().any(|d| d.bone.is_none());
     let deviation = settings.scale_deviations[usize::from(!has_space)];
@@ -164,8 +177,7 @@ fn solve(model: &TrackerModel, data: SizeInformation) -> Option<DVector<f64>> {
         h[(a, b)] -= w;
         h[(b, a)] -= w;
     }
-    let x = h.cholesky()?.solve(&data.evidence);
-    x.iter().all(|v| v.is_finite()).then_some(x)
+    h
 }
 
 /// Motion of the posed body per unit of each direction of size.

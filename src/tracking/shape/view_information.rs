@@ -75,6 +75,18 @@ impl ViewInformation {
         self.views[view.0].frames
     }
 
+    /// Mean of each view's frames, summed over views, for `n` directions; `None` before the first frame.
+    pub(crate) fn total(&self, n: usize) -> Option<SizeInformation> {
+        let mut total = SizeInformation {
+            information: DMatrix::zeros(n, n),
+            evidence: DVector::zeros(n),
+        };
+        for view in self.views.iter().filter(|v| v.weight > 0.0) {
+            total.add(&view.information, &view.evidence, 1.0 / view.weight);
+        }
+        (self.views.iter().any(|v| v.weight > 0.0)).then_some(total)
+    }
+
     /// Mean of each view's frames, summed over views, with `frame` added to its view, whose earlier frames fade by `fade`.
     /// With `keep` it stays added.
     pub(crate) fn with(

@@ -197,6 +197,10 @@ impl TrackedFrame<'_> {
             .map(|(j, s)| (j.name.as_str(), *s))
             .collect();
         line["joints"] = json!(joints);
+        line["girth_deviations_mm"] = json!(state.girth_deviations(model).map(|d| {
+            let of = [("chest", d.chest), ("waist", d.waist), ("hip", d.hip)];
+            BTreeMap::from(of.map(|(place, deviation)| (place, 1e3 * deviation)))
+        }));
         line["pose"] = json!(state.pose);
         line["scales"] = json!(scales);
         line["shape"] = json!(state.shape.coefficients);

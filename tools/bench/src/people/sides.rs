@@ -26,8 +26,15 @@ const FRAMES: u64 = 72;
 /// Garment whose size is suggested.
 const GARMENT: &str = "tshirt";
 
-/// Size and girth of the chest, metres.
-type Fit = (Size, f64);
+/// Size and chest of a tracked body.
+#[derive(Clone, Copy)]
+struct Fit {
+    size: Size,
+    /// Girth of the chest, metres.
+    chest: f64,
+    /// Its standard deviation as the tracker states it, metres.
+    deviation: f64,
+}
 
 /// Result of one side.
 struct SideView {
@@ -106,12 +113,16 @@ impl Turntable {
     }
 }
 
-/// Size of the garment and girth of the chest of the tracked body.
+/// Size of the garment and chest of the tracked body.
 fn fit(session: &TrackedSession) -> Option<Fit> {
     let template = session.model.template();
     let measures = tape(template, &template.personalise(&session.state.shape)).ok()?;
     let suggestion = suggest(GARMENT, &measures).ok()?;
-    Some((suggestion.size, measures.chest))
+    Some(Fit {
+        size: suggestion.size,
+        chest: measures.chest,
+        deviation: session.state.girth_deviations(&session.model)?.chest,
+    })
 }
 
 /// True girth of the chest, metres; `None` for a body that the tape cannot measure.
@@ -129,27 +140,36 @@ struct SideFits {
     ranges: Vec<f64>,
     /// Of all sides, millimetres.
     errors: Vec<(String, f64)>,
+    /// Stated deviations, millimetres.
+    deviations: Vec<f64>,
+    /// Errors within twice the stated deviation.
+    within: Vec<bool>,
 }
 
 impl SideFits {
     /// Adds the fits of a person from all sides; `chest` is the true girth, metres.
     fn add(&mut self, name: &str, chest: Option<f64>, fits: impl Iterator<Item = Option<Fit>>) {
         let fits: Vec<Fit> = fits.flatten().collect();
-        let off = fits.iter().filter_map(|f| Some(1e3 * (f.1 - chest?).abs()));
-        self.errors.extend(off.map(|mm| (name.to_owned(), mm)));
-        let is_same = fits.len() == SIDES && fits.iter().all(|f| f.0 == fits[0].0);
+        for (f, chest) in fits.iter().filter_map(|f| Some((f, chest?))) {
+            let off = (f.chest - chest).abs();
+            self.errors.push((name.to_owned(), 1e3 * off));
+            self.within.push(off < 2.0 * f.deviation);
+        }
+        self.deviations
+            .extend(fits.iter().map(|f| 1e3 * f.deviation));
+        let is_same = fits.len() == SIDES && fits.iter().all(|f| f.size == fits[0].size);
         self.same.push(is_same);
-        let chests = || fits.iter().map(|f| f.1 * 1e3);
+        let chests = || fits.iter().map(|f| f.chest * 1e3);
         let range = chests().fold(f64::MIN, f64::max) - chests().fold(f64::MAX, f64::min);
         self.ranges.push(range);
         if !is_same {
-            let text: Vec<String> = fits.iter().map(|f| f.0.to_string()).collect();
+            let text: Vec<String> = fits.iter().map(|f| f.size.to_string()).collect();
             let name = format!("{name} ({})", text.join(" "));
             self.differing.push((name, range));
         }
     }
 
-    fn bars(self, when: &str) -> [Bar; 3] {
+    fn bars(self, when: &str) -> [Bar; 5] {
         let count = self.same.len();
         let errors: Vec<f64> = self.errors.iter().map(|e| e.1).collect();
         [
@@ -169,6 +189,16 @@ impl SideFits {
                 format!("range of the chest girth over the sides{when}, median [mm]"),
                 median(&self.ranges),
                 count,
+            ),
+            Bar::new(
+                format!("stated deviation of the chest girth{when}, median [mm]"),
+                median(&self.deviations),
+                self.deviations.len(),
+            ),
+            Bar::new(
+                format!("chest girths within two stated deviations{when} [%]"),
+                percent(self.within),
+                errors.len(),
             ),
         ]
     }
