@@ -1,6 +1,6 @@
 //! Fabrics by name: one file each, with the publication its numbers come from.
 
-use super::{Bending, GarmentError, Material, Tensile};
+use super::{Bending, FabricLook, GarmentError, Material, Tensile};
 use serde::Deserialize;
 
 /// Fabric of a file.
@@ -12,6 +12,8 @@ pub struct FabricSample {
     pub drape_coefficient: Option<f64>,
     /// Fields that are no measurement of this fabric.
     pub estimated: Vec<String>,
+    /// What it looks like.
+    pub look: FabricLook,
 }
 
 /// Text of a fabric file.
@@ -35,6 +37,7 @@ struct FabricFile {
     friction: f64,
     damping: f64,
     drape_coefficient: Option<f64>,
+    look: FabricLook,
     estimated: Vec<String>,
     source: String,
 }
@@ -66,6 +69,7 @@ impl FabricSample {
             material,
             drape_coefficient: None,
             estimated: Vec::new(),
+            look: FabricLook::default(),
         }
     }
     /// True if a field is no measurement of this fabric.
@@ -126,6 +130,7 @@ impl FabricFile {
             material,
             drape_coefficient: self.drape_coefficient,
             estimated: self.estimated,
+            look: self.look,
         })
     }
 }

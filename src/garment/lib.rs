@@ -5,7 +5,7 @@
 //! - Panels, seams, darts: [`mod@pattern`].
 //! - Welding of panels to one mesh: [`mod@mesh`].
 //! - Triangles of a panel: [`mod@triangulate`].
-//! - Fabrics in SI units: [`mod@material`], their files [`mod@fabric`], bending by direction [`mod@bending`], tension
+//! - Fabrics in SI units: [`mod@material`], their files [`mod@fabric`], what they look like [`mod@look`], bending by direction [`mod@bending`], tension
 //!   curves [`mod@tensile`].
 //! - Drafts of tops with their sleeves and hoods: [`mod@library::top`].
 //! - Cuts of all of them, ease and lengths: [`mod@library::cuts`].
@@ -22,6 +22,7 @@ mod fabric_image;
 mod flat_triangle;
 pub mod import;
 pub mod library;
+mod look;
 mod material;
 mod mesh;
 mod outline;
@@ -36,6 +37,7 @@ pub use error::GarmentError;
 pub use fabric::FabricSample;
 pub use fabric_image::FabricImage;
 pub use flat_triangle::rest_area;
+pub use look::{FabricLook, Finish, Structure};
 pub use material::{IsotropicSolid, Material};
 pub use mesh::{AnchorKind, AnchorSet, GarmentMesh, Region, RenderMesh, joined_faces};
 pub use outline::{Curve, PanelEdge};

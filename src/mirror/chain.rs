@@ -2,6 +2,7 @@
 
 use super::body::PosedBody;
 use super::choice::Choice;
+use super::drawn_look::DrawnLook;
 use super::error::MirrorError;
 use super::offline_run::OfflineRun;
 use super::outfit::{DressedOutfit, PutOn, Subject};
@@ -10,6 +11,7 @@ use super::report::{MirrorFrame, StageTimer};
 use super::wear::{SizeState, Wear};
 use std::sync::Arc;
 use tryon_body::{BodyShape, Template};
+use tryon_garment::GarmentMesh;
 use tryon_geometry::camera::{Calibration, ColorImage, RgbdFrame};
 use tryon_geometry::math::P3;
 use tryon_landmarks::Landmarker;
@@ -31,11 +33,11 @@ pub struct Mirror {
     painter: OutfitPainter,
 }
 
-/// Garments on the subject and the appearance of each.
+/// Garments on the subject and the look of each.
 #[derive(Debug)]
 struct Worn {
     wear: Wear,
-    appearances: Vec<Appearance>,
+    looks: Vec<DrawnLook>,
     /// The tracker's number of the subject who wears it.
     subject: u64,
 }
@@ -143,9 +145,9 @@ impl Mirror {
         self.worn.as_ref().map(|w| w.wear.outfit())
     }
 
-    /// Colour and surface of each garment of the outfit; empty before the subject is dressed.
-    pub fn appearances(&self) -> &[Appearance] {
-        self.worn.as_ref().map_or(&[], |w| &w.appearances)
+    /// Look of each garment of the outfit; empty before the subject is dressed.
+    pub fn looks(&self) -> &[DrawnLook] {
+        self.worn.as_ref().map_or(&[], |w| &w.looks)
     }
 
     /// Picture of the last frame with the outfit as the offline solver moved it, on the body that it met.
@@ -161,7 +163,7 @@ impl Mirror {
         let (outfit, state) = (run.outfit(), run.solver().state());
         let drawn = DrawnOutfit {
             garments: outfit.garments(),
-            appearances: self.appearances(),
+            looks: self.looks(),
             positions: &outfit.drawn_positions(&state.positions()),
             body: &state.obstacle_positions(),
         };
@@ -210,7 +212,7 @@ impl Mirror {
         let mut wear = Wear::put_on(choices, &subject, is_sized, PutOn::default())?;
         wear.follow(&subject, is_sized)?;
         self.worn = Some(Worn {
-            appearances: appearances(wear.outfit()),
+            looks: looks(wear.outfit()),
             wear,
             subject: self.tracked.subject,
         });
@@ -245,7 +247,7 @@ impl Mirror {
         let positions = worn.map_or_else(Vec::new, |w| w.wear.outfit().drawn_positions());
         let outfit = worn.map(|worn| DrawnOutfit {
             garments: &worn.wear.outfit().model.outfit.garments,
-            appearances: &worn.appearances,
+            looks: &worn.looks,
             positions: &positions,
             body: worn.wear.outfit().state.collision_body().vertices(),
         });
@@ -258,19 +260,20 @@ impl Mirror {
     }
 }
 
-/// Colour and surface of each garment of an outfit.
-fn appearances(outfit: &DressedOutfit) -> Vec<Appearance> {
-    let appearance = |k: usize| {
+/// Look of each garment.
+fn looks(outfit: &DressedOutfit) -> Vec<DrawnLook> {
+    let look = |(k, mesh): (usize, &GarmentMesh)| {
         let source = outfit.source(k).map(|s| &outfit.worn()[s]);
-        source.map_or_else(Appearance::default, |garment| Appearance {
+        let appearance = source.map_or_else(Appearance::default, |garment| Appearance {
             base: garment.color(),
             pattern: garment.image().map_or(Print::Solid, |image| {
                 Print::Image(Arc::new(ImagePyramid::new(image)))
             }),
             ..Appearance::default()
-        })
+        });
+        DrawnLook::of(&mesh.render, &mesh.material.name, appearance)
     };
-    (0..outfit.model.outfit.garments.len())
-        .map(appearance)
+    (outfit.model.outfit.garments.iter().enumerate())
+        .map(look)
         .collect()
 }

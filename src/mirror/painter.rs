@@ -1,12 +1,13 @@
 //! Compositing of garments over the captured frames of one camera.
 
+use super::drawn_look::DrawnLook;
 use super::picture::{CameraGarments, DrawnBody, DrawnSurface};
 use std::sync::Arc;
 use tryon_body::Template;
 use tryon_garment::GarmentMesh;
 use tryon_geometry::camera::{Calibration, ColorImage, RgbdFrame};
 use tryon_geometry::math::{Camera, P3, Rigid, World};
-use tryon_view::{Appearance, RenderError, RenderReport};
+use tryon_view::{RenderError, RenderReport};
 
 /// Garments to draw and the body under them.
 #[derive(Clone, Copy, Debug)]
@@ -14,7 +15,7 @@ pub(super) struct DrawnOutfit<'a> {
     /// Meshes, innermost first.
     pub(super) garments: &'a [GarmentMesh],
     /// Colour and surface of each.
-    pub(super) appearances: &'a [Appearance],
+    pub(super) looks: &'a [DrawnLook],
     /// Vertices of each drawn mesh (world, metres).
     pub(super) positions: &'a [Vec<P3>],
     /// Body that the cloth met (world, metres), so that cloth stays off its skin.
@@ -68,13 +69,12 @@ impl OutfitPainter {
         let world = positions.iter().map(Vec::as_slice);
         self.garments.place(camera_from_world, world);
         let surfaces = outfit.iter().flat_map(|outfit| {
-            (outfit.garments.iter().zip(outfit.appearances)).map(|(mesh, appearance)| {
-                DrawnSurface {
-                    faces: &mesh.render.faces,
-                    uv: &mesh.render.uv,
-                    vertex: &mesh.render.vertex,
-                    appearance,
-                }
+            (outfit.garments.iter().zip(outfit.looks)).map(|(mesh, look)| DrawnSurface {
+                faces: &mesh.render.faces,
+                uv: &mesh.render.uv,
+                vertex: &mesh.render.vertex,
+                places: &look.places,
+                appearance: &look.appearance,
             })
         });
 

@@ -7,7 +7,7 @@ use tryon_cloth::{Config, collision_model};
 use tryon_garment::library;
 use tryon_geometry::math::{Camera, P3, Rigid, V3, World};
 use tryon_geometry::mesh::{Face, face_normal};
-use tryon_view::{Appearance, BodyView, GarmentView, Limbs, Print};
+use tryon_view::{Appearance, BodyView, EdgePlace, GarmentView, Limbs, Print};
 
 /// Appearance of a garment of the library; of other names that of its first garment.
 pub fn library_appearance(garment: &str) -> Appearance {
@@ -26,6 +26,8 @@ pub struct DrawnSurface<'a> {
     pub uv: &'a [[f32; 2]],
     /// Simulated vertex under each drawn one, shape `[n]`.
     pub vertex: &'a [u32],
+    /// Places in the pattern, shape `[n]`, or empty.
+    pub places: &'a [EdgePlace],
     /// Colour and surface of the fabric.
     pub appearance: &'a Appearance,
 }
@@ -90,6 +92,7 @@ impl CameraGarments {
                 faces: surface.faces,
                 uv: surface.uv,
                 normals,
+                places: surface.places,
                 appearance: surface.appearance,
             })
             .collect()

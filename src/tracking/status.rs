@@ -12,6 +12,8 @@ pub enum LostReason {
     Residual,
     /// The body lies in measured free space, or leaves much of the subject uncovered.
     Disagreement,
+    /// It is no person.
+    Thing,
     /// The result of a step was not finite and was discarded.
     NotFinite,
 }

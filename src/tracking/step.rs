@@ -279,7 +279,7 @@ fn refuse(
 ) {
     let settings = &model.config.segment.refusals;
     let log_odds = match reason {
-        LostReason::Disagreement => state.belief.log_odds,
+        LostReason::Disagreement | LostReason::Thing => state.belief.log_odds,
         _ => state.refusals.log_odds(&candidate, settings),
     };
     state

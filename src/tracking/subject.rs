@@ -206,7 +206,12 @@ impl SubjectFrame<'_> {
             if let Some(before) = before {
                 (state.size, state.shape) = before;
             }
-            return Err(LostReason::Disagreement);
+            let is_thing = state.belief.verdict == Verdict::Nobody;
+            return Err(if is_thing {
+                LostReason::Thing
+            } else {
+                LostReason::Disagreement
+            });
         }
         let status = state.status;
         state.subject += u64::from(is_new);

@@ -1,5 +1,6 @@
 //! Colour and pattern of fabrics, in sRGB and linear light.
 
+use super::cloth::Cloth;
 use super::image_pyramid::ImagePyramid;
 use super::srgb::linear;
 use serde::{Deserialize, Serialize};
@@ -16,6 +17,9 @@ pub struct Appearance {
     pub roughness: f32,
     /// Metres on the cloth per unit of texture coordinate; 1 when UVs are metres on the flat panel.
     pub metres_per_uv: f32,
+    /// Yarns, uneven surface and sewn edges; `None` for a smooth sheet.
+    #[serde(skip)]
+    pub cloth: Option<Arc<Cloth>>,
 }
 
 /// A fabric's pattern over its texture coordinates.
@@ -61,6 +65,7 @@ impl Default for Appearance {
             pattern: Print::Solid,
             roughness: 0.8,
             metres_per_uv: 1.0,
+            cloth: None,
         }
     }
 }
@@ -75,6 +80,7 @@ pub(crate) struct Fabric {
     pub(crate) print: Print,
     pub(crate) gloss: f32,
     pub(crate) metres_per_uv: f32,
+    pub(crate) cloth: Option<Arc<Cloth>>,
 }
 
 /// Mean of a square wave (half on) over a pixel of `width` periods centred at `x` periods.
@@ -115,6 +121,7 @@ impl Fabric {
             print: appearance.pattern.clone(),
             gloss: (1.0 - appearance.roughness).clamp(0.0, 1.0),
             metres_per_uv: appearance.metres_per_uv,
+            cloth: appearance.cloth.clone(),
         }
     }
     /// Linear reflectance at a texture coordinate, averaged over a pixel that spans `footprint` metres.

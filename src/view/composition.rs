@@ -11,7 +11,8 @@ use super::input::{Input, RenderError};
 use super::matte::MatteInput;
 use super::off_person::{OffPerson, OffPersonInput};
 use super::report::{HandReport, RenderReport};
-use super::settings::{BareArmSettings, OffPersonSettings};
+use super::room_light::{LitScene, RoomLight};
+use super::settings::{BareArmSettings, OffPersonSettings, RoomLightSettings};
 use super::silhouette_grid::DressedArea;
 use super::state::State;
 use super::viewport::Viewport;
@@ -38,6 +39,8 @@ pub(crate) struct Composition<'a> {
     shadow_reach: f32,
     /// Samples along each side of a pixel.
     pub(crate) samples: u32,
+    /// There is a tracked body, in `work.body`.
+    is_tracked: bool,
     /// Captured depth from the picture's camera.
     depth: Cow<'a, DepthImage>,
     clock: Instant,
@@ -67,6 +70,7 @@ impl<'a> Composition<'a> {
             area: None,
             shadow_reach: 0.0,
             samples: config.samples_per_side(),
+            is_tracked: false,
             viewport,
             clock,
         };
@@ -85,6 +89,24 @@ impl<'a> Composition<'a> {
         self.clock = Instant::now();
     }
 
+    /// Draws the tracked body into `work.body`, and measures the light of the room on it if that is due. Before all that
+    /// depends on either.
+    pub(crate) fn see_body(
+        &mut self,
+        model: &Model,
+        state: &mut State,
+        input: &Input<'_>,
+        work: &mut Workspace,
+        area: &Area,
+    ) {
+        let config = &model.config;
+        self.is_tracked = (work.body).rasterise(config.par, input, &self.viewport, area);
+        if self.is_tracked {
+            self.measure_light(&config.room_light, state, input, work);
+        }
+        self.lap("body");
+    }
+
     /// Decides what hides the garments of `work.pixels`, and the contact shadows: fills `work.matte` and `work.shadows`.
     /// Then measures the garments off the person, if that is due. Returns the captured depth of the area.
     pub(crate) fn resolve_visibility(
@@ -97,7 +119,7 @@ impl<'a> Composition<'a> {
     ) -> AreaDepth {
         let config = &model.config;
         remove_biases(config, &work.surface, &mut work.pixels);
-        let is_tracked = (work.body).rasterise(config.par, input, &self.viewport, area);
+        let is_tracked = self.is_tracked;
         let depth = AreaDepth::new(&self.viewport, area, self.depth.data());
         collect_evidence(model, work, area, &depth, is_tracked);
         self.lap("evidence");
@@ -128,6 +150,32 @@ impl<'a> Composition<'a> {
             self.lap("off person");
         }
         depth
+    }
+
+    /// Measures the light of the room, if that is due.
+    fn measure_light(
+        &self,
+        settings: &RoomLightSettings,
+        state: &mut State,
+        input: &Input<'_>,
+        work: &Workspace,
+    ) {
+        let (Some(body), Some(_)) = (input.body, &input.frame.color) else {
+            return;
+        };
+        let time_ns = input.frame.time_ns;
+        if !state.is_light_due(settings.interval, time_ns) {
+            return;
+        }
+        let scene = LitScene {
+            viewport: &self.viewport,
+            image: &self.image,
+            depth: self.depth.data(),
+        };
+        let vertices = work.body.vertices(input, &body);
+        if let Some(light) = RoomLight::measure(&scene, &body, vertices, settings) {
+            state.take_light(light, time_ns, settings);
+        }
     }
 
     /// Measures the garments off the person in the picture.

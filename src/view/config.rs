@@ -1,6 +1,8 @@
 //! Settings of the compositor; immutable while a session runs.
 
-use super::settings::{BareArmSettings, ExposureSettings, MatteSettings, OffPersonSettings};
+use super::settings::{
+    BareArmSettings, ExposureSettings, MatteSettings, OffPersonSettings, RoomLightSettings,
+};
 use super::srgb::ToSrgb;
 use serde::{Deserialize, Serialize};
 use tryon_geometry::par::Par;
@@ -99,6 +101,8 @@ pub struct Config {
     pub off_person_interval: f64,
     /// Brightness of the room.
     pub exposure: ExposureSettings,
+    /// Light of the room.
+    pub room_light: RoomLightSettings,
     /// Matte of the captured scene.
     pub matte: MatteSettings,
     /// Bare hands and forearms.
@@ -128,6 +132,7 @@ impl Default for Config {
             skip_unseen: true,
             off_person_interval: 0.2,
             exposure: ExposureSettings::default(),
+            room_light: RoomLightSettings::default(),
             matte: MatteSettings::default(),
             bare_arms: BareArmSettings::default(),
             off_person: OffPersonSettings::default(),

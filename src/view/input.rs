@@ -1,6 +1,7 @@
 //! Input of a picture and its validation.
 
 use super::appearance::Appearance;
+use super::construction::EdgePlace;
 use super::limbs::Limbs;
 use tryon_geometry::camera::{Calibration, FrameSizeError, RgbdFrame};
 use tryon_geometry::math::{P3, V3};
@@ -17,6 +18,8 @@ pub struct GarmentView<'a> {
     pub uv: &'a [[f32; 2]],
     /// Outward unit normals, shape `[n]`, or empty (then computed).
     pub normals: &'a [V3],
+    /// Places in the pattern ([`edge_places`](super::edge_places)), shape `[n]`, or empty: then no edge is sewn.
+    pub places: &'a [EdgePlace],
     /// Colour and surface of the fabric.
     pub appearance: &'a Appearance,
 }
@@ -143,6 +146,7 @@ impl GarmentView<'_> {
         let attributes = [
             ("texture coordinates", self.uv.len()),
             ("normals", self.normals.len()),
+            ("places", self.places.len()),
         ];
         if let Some((what, got)) = attributes.into_iter().find(|a| a.1 != 0 && a.1 != vertices) {
             return Err(RenderError::Length {

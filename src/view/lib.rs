@@ -23,6 +23,7 @@
 //!     faces: &[[0, 1, 2]],
 //!     uv: &[],
 //!     normals: &[],
+//!     places: &[],
 //!     appearance: &Appearance::default(),
 //! };
 //! let input = Input {
@@ -51,7 +52,9 @@
 //! - Garments beside the recorded person: [`mod@off_person`], [`mod@silhouette_grid`].
 //! - Bare hands by colour: [`mod@hand::detect`].
 //! - Light: [`mod@shading`], [`mod@contact_shadow`].
-//! - Fabric colour and prints: [`mod@appearance`].
+//! - Light of the room, from the captured person: [`mod@room_light`].
+//! - Fabric colour and prints: [`mod@appearance`]. Yarns and surface: [`mod@cloth_tile`]; both: [`mod@cloth`].
+//! - Seams, hems, ribs: [`mod@construction`], [`mod@edge_profile`].
 //! - Images on fabric: [`mod@image_pyramid`].
 //! - Card or processor: [`mod@gpu::choice`].
 //! - Shaders: [`mod@gpu::pipelines`].
@@ -64,10 +67,14 @@ mod blend;
 mod body_depth;
 mod captured;
 pub(crate) mod captured_depth;
+mod cloth;
+mod cloth_tile;
 pub(crate) mod composition;
 mod config;
+mod construction;
 pub(crate) mod contact_shadow;
 pub(crate) mod coverage;
+mod edge_profile;
 mod evidence;
 #[cfg(feature = "gpu")]
 pub mod gpu;
@@ -80,6 +87,7 @@ mod occluder;
 mod off_person;
 mod render;
 mod report;
+mod room_light;
 mod settings;
 pub(crate) mod shading;
 mod silhouette_grid;
@@ -94,15 +102,19 @@ pub(crate) mod viewport;
 mod workspace;
 
 pub use appearance::{Appearance, Print};
+pub use cloth::Cloth;
 pub use config::{Config, Framing, Lights, Margins, Model};
+pub use construction::{EdgePlace, edge_places};
 pub use image_pyramid::ImagePyramid;
 pub use input::{BodyView, GarmentView, Input, RenderError};
 pub use limbs::Limbs;
 pub use off_person::OffPerson;
 pub use render::render;
 pub use report::{HandReport, RenderReport};
+pub use room_light::RoomLight;
 pub use settings::{
-    BareArmSettings, ExposureSettings, LimbSettings, MatteSettings, OffPersonSettings, SkinSettings,
+    BareArmSettings, ExposureSettings, LimbSettings, MatteSettings, OffPersonSettings,
+    RoomLightSettings, SkinSettings,
 };
 pub use state::State;
 pub use workspace::Workspace;

@@ -52,10 +52,17 @@ impl Limbs {
         out
     }
 
+    /// Part of a vertex.
+    pub(super) fn part(&self, vertex: u32) -> Option<BodyPart> {
+        self.parts.get(vertex as usize).copied()
+    }
+
     /// Belongs to an arm.
     pub(super) fn is_arm(&self, vertex: u32) -> bool {
-        let part = self.parts.get(vertex as usize);
-        matches!(part, Some(BodyPart::LeftArm | BodyPart::RightArm))
+        matches!(
+            self.part(vertex),
+            Some(BodyPart::LeftArm | BodyPart::RightArm)
+        )
     }
 
     /// Made for a body of so many vertices.

@@ -27,6 +27,7 @@ pub fn render(
     let Some(area) = picture.area else {
         return Ok(picture.end(work));
     };
+    picture.see_body(model, state, input, work, &area);
     let (n, surface) = (picture.samples, &mut work.surface);
     picture.report.faces_hidden = surface.rasterise(config, &picture.viewport, &area, n);
     (surface.visible).reset(surface.faces.len(), !config.skip_unseen);
@@ -43,6 +44,7 @@ pub fn render(
             picture.viewport.camera,
             &model.to_srgb,
             &config.lights,
+            state.room_light.as_ref().map(|(light, _)| light),
             picture.report.brightness,
         ),
         work,

@@ -13,6 +13,36 @@ settings! {
         pub range: [f32; 2] = [0.45, 1.25],
     }
 
+    /// Settings of the light of the room.
+    pub struct RoomLightSettings {
+        /// Time between two measurements, seconds: lamps don't move.
+        pub interval: f64 = 0.25,
+        /// Time in which a new light takes the place of an old one, seconds. Smaller flickers with the pose.
+        pub memory: f32 = 1.5,
+        /// Patches of the body looked at, at most; and least, of which a light is told.
+        pub most_patches: usize = 3000,
+        /// See `most_patches`.
+        pub least_patches: usize = 150,
+        /// Cosine of the viewing angle below which a patch is an outline.
+        pub least_facing: f32 = 0.25,
+        /// Distance of the reading from the tracked skin beyond which something else is seen, metres.
+        pub most_apart: f32 = 0.06,
+        /// Brightest channel of a usable colour: below it is noise, above it is blown out.
+        pub exposed: [u8; 2] = [12, 250],
+        /// Difference of brightness over the mean that counts half: folds, prints, shine.
+        pub spread: f32 = 0.25,
+        /// Weight of the usual light, from above and before, against what is seen: the side that no camera sees says nothing.
+        pub ridge: f32 = 0.02,
+        /// The usual light.
+        pub prior: [f32; 3] = [-0.1, -0.5, -0.35],
+        /// Largest change with the normal over the mean: a lamp close by in a dark room.
+        pub most_slope: f32 = 0.9,
+        /// Share of the difference between colours that is believed.
+        pub tint: f32 = 0.5,
+        /// Least light of a side, over the mean.
+        pub least_light: f32 = 0.05,
+    }
+
     /// Settings of the matte of the captured scene over the garments.
     pub struct MatteSettings {
         /// Distance from a patch's edge at which depths are compared, depth pixels: flying pixels lie in between.

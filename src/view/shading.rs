@@ -1,8 +1,12 @@
 //! Light on cloth: hemisphere light, one key lamp, openness of folds, the inner side.
 
+use super::appearance::Fabric;
+use super::cloth::Cloth;
 use super::config::Lights;
+use super::construction::EdgePlace;
+use super::room_light::RoomLight;
 use super::srgb::ToSrgb;
-use super::surface::Surface;
+use super::surface::{Surface, VertexAttributes};
 use tryon_geometry::camera::Intrinsics;
 use tryon_geometry::math::V3;
 
@@ -10,6 +14,10 @@ use tryon_geometry::math::V3;
 const WRAP: f32 = 0.25;
 /// Least cosine of the viewing angle in a pixel's footprint; smaller, and patterns would fade to nothing at edges.
 const GRAZING: f32 = 0.2;
+/// Slope of the room's light below which it has no direction.
+const MIN_SLOPE: f32 = 0.05;
+/// Square of the light on a side that the room's light would leave black.
+const LEAST_LIGHT: f32 = 0.02;
 /// Exponent of the sheen of satin (Blinn–Phong).
 const SHEEN_POWER: i32 = 16;
 /// Sheen of satin at its brightest.
@@ -23,6 +31,11 @@ pub(crate) struct Shader<'a> {
     pub(crate) lights: Lights,
     pub(crate) up: V3,
     pub(crate) key: V3,
+    /// Strength of the lamp in highlights.
+    pub(crate) lamp: f32,
+    /// Mean light, and its change with the normal over the mean by channel, where the room's light is known.
+    level: f32,
+    room: Option<[V3; 3]>,
     pub(crate) brightness: f32,
 }
 
@@ -31,7 +44,10 @@ pub(crate) struct Shader<'a> {
 pub(crate) struct ShadedFace {
     face: u32,
     gradient: [V3; 3],
-    corners: [[f32; 8]; 3],
+    corners: [VertexAttributes; 3],
+    /// Gradients of both texture coordinates (metres), of the distance from a free edge and the length along it, and of the
+    /// distance from a seam.
+    along: [V3; 5],
 }
 
 impl Default for ShadedFace {
@@ -39,7 +55,8 @@ impl Default for ShadedFace {
         Self {
             face: u32::MAX,
             gradient: [V3::zeros(); 3],
-            corners: [[0.0; 8]; 3],
+            corners: [[0.0; 12]; 3],
+            along: [V3::zeros(); 5],
         }
     }
 }
@@ -50,6 +67,7 @@ impl<'a> Shader<'a> {
         camera: Intrinsics,
         to_srgb: &'a ToSrgb,
         lights: &Lights,
+        room: Option<&RoomLight>,
         brightness: f32,
     ) -> Self {
         let unit = |d: [f32; 3]| {
@@ -57,15 +75,33 @@ impl<'a> Shader<'a> {
                 .try_normalize(0.0)
                 .unwrap_or_else(|| V3::new(0.0, -1.0, 0.0))
         };
+        let slopes = room.map(|r| r.slope.map(V3::from));
+        let mean: Option<V3> = slopes.map(|s| (s[0] + s[1] + s[2]) / 3.0);
+        let key = mean.and_then(|m| m.try_normalize(MIN_SLOPE));
         Self {
             surface,
             camera,
             to_srgb,
             lights: *lights,
             up: unit(lights.up),
-            key: unit(lights.key_direction),
+            key: key.unwrap_or_else(|| unit(lights.key_direction)),
+            lamp: mean.map_or(lights.key, |m| lights.key * m.norm().min(1.0)),
+            level: 0.5 * (lights.sky + lights.ground) + lights.key * WRAP / (1.0 + WRAP),
+            room: slopes,
             brightness,
         }
+    }
+
+    /// Slope of the room's light by channel; beside them the mean light, 1 with a known room, and the lamp of highlights.
+    #[cfg(feature = "gpu")]
+    pub(crate) fn room_rows(&self) -> [[f32; 4]; 3] {
+        let slopes = self.room.unwrap_or_default();
+        let beside = [
+            self.level,
+            f32::from(u8::from(self.room.is_some())),
+            self.lamp,
+        ];
+        [0, 1, 2].map(|c| [slopes[c].x, slopes[c].y, slopes[c].z, beside[c]])
     }
 
     /// sRGB (0 to 255) of a face at picture position (u, v); `shadow` is the share of light taken away.
@@ -80,15 +116,16 @@ impl<'a> Shader<'a> {
         let s = self.surface;
         if cache.face != face {
             let f = s.faces[face as usize].map(|i| i as usize);
-            let [a, b, c] = f.map(|i| s.vertices[i].coords);
-            *cache = ShadedFace {
+            let fabric = &s.fabrics[usize::from(s.garment[face as usize])];
+            *cache = ShadedFace::new(
                 face,
-                gradient: [b.cross(&c), c.cross(&a), a.cross(&b)],
-                corners: f.map(|i| s.attributes[i]),
-            };
+                f.map(|i| s.vertices[i].coords),
+                f.map(|i| s.attributes[i]),
+                fabric,
+            );
         }
         let ray = self.camera.unproject(u, v, 1.0).coords;
-        let [nx, ny, nz, open, tu, tv, z, _] = cache.interpolate(&ray);
+        let [nx, ny, nz, open, tu, tv, z, free, along, seam, upper, _] = cache.interpolate(&ray);
         let eye = ray * -ray.norm_squared().sqrt().recip();
         let n = V3::new(nx, ny, nz);
         let length = n.norm_squared().sqrt();
@@ -103,13 +140,52 @@ impl<'a> Shader<'a> {
         let facing = n.dot(&eye).abs().max(GRAZING);
         let footprint = z / (self.camera.fx as f32 * facing);
         let fabric = &s.fabrics[usize::from(s.garment[face as usize])];
-        let albedo = fabric.albedo([tu, tv], footprint);
+        let mut albedo = fabric.albedo([tu, tv], footprint);
 
         let side = if is_inner { self.lights.inside } else { 1.0 };
         let gain = self.brightness * side * (1.0 - shadow);
-        let diffuse = self.diffuse(&n, open) * gain;
-        let sheen = self.sheen(&n, &eye, fabric.gloss) * gain;
-        albedo.map(|a| self.to_srgb.get(a * diffuse + sheen))
+        let Some(cloth) = &fabric.cloth else {
+            let diffuse = self.diffuse(&n, open) * gain;
+            let sheen = self.sheen(&n, &eye, fabric.gloss) * gain;
+            return albedo.map(|a| self.to_srgb.get(a * diffuse + sheen));
+        };
+        let place = EdgePlace {
+            free,
+            along,
+            seam,
+            is_upper: upper > 0.5,
+        };
+        let uv = [tu, tv].map(|t| t * fabric.metres_per_uv);
+        let relief = cloth.sample(uv, &place, footprint);
+        let tilt: V3 = (cache.along.iter().zip(relief.slopes))
+            .map(|(g, s)| g * s)
+            .sum();
+        let tilted = n - if is_inner { -tilt } else { tilt };
+        let n = tilted * tilted.norm_squared().max(f32::MIN_POSITIVE).sqrt().recip();
+        albedo = albedo.map(|a| a * relief.tone);
+        let light = ClothLight {
+            shader: self,
+            normal: n,
+            eye,
+            open,
+        };
+        light
+            .reflected(cloth, relief.variance, albedo)
+            .map(|c| self.to_srgb.get(c * gain))
+    }
+
+    /// Light on a surface by channel; `open` is the share of it that reaches the surface.
+    #[inline]
+    fn irradiance(&self, n: &V3, open: f32) -> [f32; 3] {
+        let Some(room) = &self.room else {
+            return [self.diffuse(n, open); 3];
+        };
+        room.map(|slope| {
+            let e = 1.0 + slope.dot(n);
+            // No side is without any light; a smooth end of the linear law.
+            let lit = 0.5 * (e + (e * e + LEAST_LIGHT).sqrt());
+            self.level * lit * open
+        })
     }
 
     /// Hemisphere light and wrapped key light; `open` is the share of ambient light that reaches the surface.
@@ -132,10 +208,85 @@ impl<'a> Shader<'a> {
     }
 }
 
+/// Light that a piece of cloth reflects.
+struct ClothLight<'a> {
+    shader: &'a Shader<'a>,
+    normal: V3,
+    /// Towards the camera.
+    eye: V3,
+    open: f32,
+}
+
+impl ClothLight<'_> {
+    /// Diffuse light, a microfacet highlight (GGX) of the lamp, and the sheen of fibres that stand off (after Estevez & Kulla
+    /// 2017: strongest along the surface).
+    #[inline]
+    fn reflected(&self, cloth: &Cloth, variance: f32, albedo: [f32; 3]) -> [f32; 3] {
+        let (n, look) = (&self.normal, &cloth.look);
+        let light = self.shader.irradiance(n, self.open);
+        let facing = n.dot(&self.eye).clamp(0.0, 1.0);
+        let grazing = (1.0 - facing).powi(3);
+        let fuzz = look.fuzz * grazing;
+        let key = self.shader.key;
+        let towards = n.dot(&key).max(0.0);
+        // Slopes within the pixel widen the highlight.
+        let alpha = (look.roughness.powi(2) + 2.0 * variance).min(1.0);
+        let half = key + self.eye;
+        let half = half * half.norm_squared().max(f32::MIN_POSITIVE).sqrt().recip();
+        let h = n.dot(&half).max(0.0);
+        let a2 = alpha * alpha;
+        let spread = h * h * (a2 - 1.0) + 1.0;
+        let lobe = a2 / (4.0 * spread * spread);
+        let edge = (1.0 - half.dot(&self.eye).clamp(0.0, 1.0)).powi(5);
+        let fresnel = look.specular + (1.0 - look.specular) * edge;
+        let shine = fresnel * lobe * towards * self.shader.lamp * self.open.min(1.0);
+        std::array::from_fn(|c| {
+            let body = albedo[c] * (1.0 - 0.5 * fuzz);
+            (body + fuzz * (0.15 + 0.5 * albedo[c])) * light[c] + shine
+        })
+    }
+}
+
+/// Steepest gradient of a coordinate along the surface that is believed: beyond it, an edge's length jumps within a face.
+const STEEPEST: f32 = 2.5;
+
 impl ShadedFace {
+    fn new(face: u32, [a, b, c]: [V3; 3], corners: [VertexAttributes; 3], fabric: &Fabric) -> Self {
+        let mut along = [V3::zeros(); 5];
+        if fabric.cloth.is_some() {
+            let n = (b - a).cross(&(c - a));
+            let scale = n.norm_squared().max(f32::MIN_POSITIVE).recip();
+            // Gradients of the barycentric coordinates.
+            let g = [n.cross(&(c - b)), n.cross(&(a - c)), n.cross(&(b - a))].map(|g| g * scale);
+            let metres = fabric.metres_per_uv;
+            let of = |k: usize, unit: f32| -> V3 {
+                let sum: V3 = (0..3).map(|i| g[i] * corners[i][k]).sum();
+                let sum = sum * unit;
+                if sum.norm_squared() > STEEPEST * STEEPEST {
+                    V3::zeros()
+                } else {
+                    sum
+                }
+            };
+            along = [
+                of(4, metres),
+                of(5, metres),
+                of(7, 1.0),
+                of(8, 1.0),
+                of(9, 1.0),
+            ];
+        }
+        Self {
+            face,
+            gradient: [b.cross(&c), c.cross(&a), a.cross(&b)],
+            corners,
+            along,
+        }
+    }
+
     /// Attributes along `ray`; outside the face, which a pixel's centre may be, those of the nearest edge.
     #[inline]
-    fn interpolate(&self, ray: &V3) -> [f32; 8] {
+    fn interpolate(&self, ray: &V3) -> VertexAttributes {
         let w = self.gradient.map(|g| g.dot(ray));
         let sum = w[0] + w[1] + w[2];
         let w = w.map(|w| (w / sum).max(0.0));

@@ -1,6 +1,7 @@
 //! Memory between pictures: colours of one user's skin and clothes, time of the last measurement.
 
-use super::settings::SkinSettings;
+use super::room_light::RoomLight;
+use super::settings::{RoomLightSettings, SkinSettings};
 use super::skin::{MIN_TONES, SkinClassifier, tone};
 use serde::{Deserialize, Serialize};
 
@@ -16,6 +17,9 @@ pub struct State {
     /// Capture time of the last measurement of garments off the person, nanoseconds; `None` = never.
     #[serde(default)]
     off_person_ns: Option<u64>,
+    /// Light of the room and the capture time of its last measurement, nanoseconds.
+    #[serde(default)]
+    pub(super) room_light: Option<(RoomLight, u64)>,
 }
 
 /// Region of the body a colour was taken from.
@@ -38,25 +42,42 @@ impl State {
         if !tracked && self.pictures > 0 {
             *self = Self {
                 off_person_ns: self.off_person_ns,
+                room_light: self.room_light,
                 ..Self::default()
             };
         }
     }
 
     /// Begins a measurement of garments off the person in the picture of `time_ns`, if one is due `interval` seconds after
-    /// the last one. A clock that runs backwards has begun anew.
+    /// the last one.
     pub(super) fn begin_off_person(&mut self, interval: f64, time_ns: u64) -> bool {
-        let elapsed = self
-            .off_person_ns
-            .and_then(|last| time_ns.checked_sub(last));
-        let is_due = match elapsed {
-            Some(ns) => ns as f64 * 1e-9 >= interval,
-            None => interval < f64::INFINITY,
-        };
+        let is_due = is_due(self.off_person_ns, interval, time_ns);
         if is_due {
             self.off_person_ns = Some(time_ns);
         }
         is_due
+    }
+
+    /// True when the light of the room is to be measured in the picture of `time_ns`: `interval` seconds after the last time.
+    pub(super) fn is_light_due(&self, interval: f64, time_ns: u64) -> bool {
+        is_due(self.room_light.map(|(_, last)| last), interval, time_ns)
+    }
+
+    /// Takes a measured light of the room.
+    pub(super) fn take_light(
+        &mut self,
+        new: RoomLight,
+        time_ns: u64,
+        settings: &RoomLightSettings,
+    ) {
+        let light = match self.room_light {
+            Some((old, last)) => {
+                let passed = time_ns.saturating_sub(last) as f64 * 1e-9;
+                old.toward(&new, passed as f32, settings)
+            }
+            None => new,
+        };
+        self.room_light = Some((light, time_ns));
     }
 
     /// Slot and vertex of the `vertices` to sample in this picture.
@@ -107,6 +128,14 @@ impl State {
         });
         self.usable = usable;
         skin.filter(|_| usable)
+    }
+}
+
+/// True `interval` seconds after the `last` time, nanoseconds. A clock that runs backwards has begun anew.
+fn is_due(last: Option<u64>, interval: f64, time_ns: u64) -> bool {
+    match last.and_then(|last| time_ns.checked_sub(last)) {
+        Some(ns) => ns as f64 * 1e-9 >= interval,
+        None => interval < f64::INFINITY,
     }
 }
 

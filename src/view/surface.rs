@@ -6,6 +6,7 @@
 use super::appearance::Fabric;
 use super::area::{Area, NEAR};
 use super::config::Config;
+use super::construction::EdgePlace;
 use super::input::{GarmentView, Input};
 use super::viewport::Viewport;
 use std::ops::Range;
@@ -44,15 +45,20 @@ impl FaceFlags {
     }
 }
 
+/// Attributes of a vertex.
+pub(crate) type VertexAttributes = [f32; 12];
+
 /// Garments joined, innermost first. Rebuilt for every picture; capacity is kept.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Surface {
     pub(crate) vertices: Vec<P3>,
     pub(super) normals: Vec<V3>,
     /// Interpolated by shading, shape `[vertices]`: normal, openness (share of ambient light that reaches the vertex),
-    /// texture coordinate, depth, unused. Valid at corners of visible faces.
-    pub(crate) attributes: Vec<[f32; 8]>,
+    /// texture coordinate, depth, distance from a free edge, length along it, distance from a seam, 1 at an upper edge,
+    /// unused. Valid at corners of visible faces.
+    pub(crate) attributes: Vec<VertexAttributes>,
     pub(super) uv: Vec<[f32; 2]>,
+    pub(super) places: Vec<EdgePlace>,
     pub(crate) faces: Vec<Face>,
     /// Index into `fabrics`, shape `[faces]`.
     pub(crate) garment: Vec<u8>,
@@ -101,6 +107,7 @@ impl Surface {
         self.vertices.clear();
         self.normals.clear();
         self.uv.clear();
+        self.places.clear();
         self.faces.clear();
         self.garment.clear();
         self.fabrics.clear();
@@ -144,6 +151,8 @@ impl Surface {
         self.normals.resize(end, V3::zeros());
         self.uv.extend_from_slice(g.uv);
         self.uv.resize(end, [0.0; 2]);
+        self.places.extend_from_slice(g.places);
+        self.places.resize(end, EdgePlace::INNER);
         self.faces
             .extend(g.faces.iter().map(|f| f.map(|i| i + base as u32)));
         self.garment.resize(self.faces.len(), number);

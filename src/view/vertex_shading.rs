@@ -5,6 +5,9 @@ use super::surface::Surface;
 use tryon_geometry::math::V3;
 use tryon_geometry::mesh::face_normal;
 
+/// Distance that is beyond every edge, metres.
+const FAR: f32 = 1.0;
+
 impl Surface {
     /// Fills `attributes` and `inner` of the visible faces; returns the number of vertices without one. Sums run over
     /// the same faces in the same order whatever is visible, so their bits equal those of a picture that shows all.
@@ -81,7 +84,7 @@ impl Surface {
 
     fn write_attributes(&mut self) -> usize {
         let mut skipped = 0;
-        self.attributes.resize(self.vertices.len(), [0.0; 8]);
+        self.attributes.resize(self.vertices.len(), [0.0; 12]);
         for (i, out) in self.attributes.iter_mut().enumerate() {
             if !self.scratch.is_visible[i] {
                 skipped += 1;
@@ -89,7 +92,24 @@ impl Surface {
             }
             let (n, [u, v]) = (&self.normals[i], self.uv[i]);
             let (open, z) = (self.scratch.openness[i], self.vertices[i].z);
-            *out = [n.x, n.y, n.z, open, u, v, z, 0.0];
+            let place = &self.places[i];
+            // Beyond every edge a large number serves as well as infinity, and can be interpolated.
+            let [free, seam] = [place.free, place.seam].map(|d| d.min(FAR));
+            let upper = f32::from(u8::from(place.is_upper));
+            *out = [
+                n.x,
+                n.y,
+                n.z,
+                open,
+                u,
+                v,
+                z,
+                free,
+                place.along,
+                seam,
+                upper,
+                0.0,
+            ];
         }
         skipped
     }

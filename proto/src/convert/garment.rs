@@ -130,7 +130,7 @@ pub fn topology_to_wire(g: &WornGarment) -> v1::GarmentTopology {
         face_count: g.faces.len() as u32,
         faces: bulk::write(g.faces.iter().copied()),
         uvs: bulk::write(g.uvs.iter().copied()),
-        look: Some(g.look),
+        look: Some(g.look.clone()),
         drawn_count: g.drawn.len() as u32,
         drawn: bulk::write_flat(&g.drawn),
         texture: g.image.as_ref().map(|i| i.wire.clone()),
@@ -152,7 +152,7 @@ pub fn topology_from_wire(t: &v1::GarmentTopology) -> Result<WornGarment, WireEr
         MAX_VERTICES,
     )?;
     let m = bulk::count("garment_topology.face_count", t.face_count, MAX_FACES)?;
-    let look = required(t.look, "garment_topology.look")?;
+    let look = required(t.look.clone(), "garment_topology.look")?;
     if !(look.stripe_width.is_finite() && look.stripe_width >= 0.0) {
         return Err(WireError::new(
             "garment_topology.look.stripe_width",
@@ -294,7 +294,7 @@ mod tests {
         let look = v1::GarmentLook {
             color_rgb: 0xff0000,
             accent_rgb: 0xff0000,
-            stripe_width: 0.0,
+            ..Default::default()
         };
         WornGarment {
             garment: "flag".into(),

@@ -2663,7 +2663,7 @@ pub struct GarmentTexture {
     pub metres_per_pixel: f32,
 }
 /// Appearance of a garment.
-#[derive(Clone, Copy, PartialEq, ::prost::Message)]
+#[derive(Clone, PartialEq, ::prost::Message)]
 pub struct GarmentLook {
     /// sRGB 0xRRGGBB.
     #[prost(uint32, tag = "1")]
@@ -2674,6 +2674,9 @@ pub struct GarmentLook {
     /// Width of a stripe of the pattern, metres; 0 means plain.
     #[prost(float, tag = "3")]
     pub stripe_width: f32,
+    /// Name of the fabric, a preset (`jersey`, `denim`, …), for yarns, sheen and sewn edges. Another name looks like jersey.
+    #[prost(string, tag = "4")]
+    pub fabric: ::prost::alloc::string::String,
 }
 #[derive(Clone, PartialEq, ::prost::Message)]
 pub struct StartSimulationRequest {

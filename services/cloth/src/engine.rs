@@ -208,6 +208,7 @@ fn worn_garment(
             color_rgb: color,
             accent_rgb: color,
             stripe_width: 0.0,
+            fabric: mesh.material.name.clone(),
         },
         image: image.map(Arc::new),
     }))

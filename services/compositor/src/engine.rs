@@ -4,26 +4,26 @@ use crate::card::Card;
 use crate::encoding::Encoding;
 use crate::formats::Format;
 use crate::join_buffer::ReportedBody;
+use crate::looks::{Looks, fit_appearance};
 use crate::off_person::NewestOffPerson;
 use std::path::Path;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
-use tryon::dressing::FIT_COLORS;
 use tryon::formats::image::{encode_jpeg, encode_png_rgb};
 use tryon::geometry::camera::ColorImage;
 use tryon::geometry::math::{Camera, Rigid, World};
 use tryon::mirror::{
-    CameraGarments, DrawnBody, DrawnSurface, FollowedBody, FrameClock, PosedBody, time_step,
+    CameraGarments, DrawnBody, DrawnLook, DrawnSurface, FollowedBody, FrameClock, PosedBody,
+    time_step,
 };
 use tryon::view::{
-    Appearance, Config, Framing, ImagePyramid, Input, Model, OffPerson, Print, RenderReport, State,
-    Workspace,
+    Appearance, Config, Framing, Input, Model, OffPerson, RenderReport, State, Workspace,
 };
 use tryon_kit::frames::{Exposure, stage};
 use tryon_kit::telemetry::record_skipped;
 use tryon_proto::convert::body::pose_from_wire;
 use tryon_proto::convert::fit::tightness;
-use tryon_proto::convert::garment::{PlacedGarments, WornGarment, WornImage};
+use tryon_proto::convert::garment::{PlacedGarments, WornGarment};
 use tryon_proto::convert::request::PictureFormat;
 use tryon_proto::v1::{ClothDetail, StageTime};
 
@@ -86,7 +86,7 @@ pub(crate) struct Engine {
     /// Capture times of the posed bodies.
     clock: FrameClock,
     garments: CameraGarments,
-    pyramids: Pyramids,
+    looks: Looks,
     off_person: NewestOffPerson,
 }
 
@@ -113,7 +113,7 @@ impl Engine {
         let mut begun = Instant::now();
         let reported = job.body.as_ref().filter(|_| job.placed.is_some());
         let has_body = reported.is_some_and(|b| self.pose(b));
-        let worn = worn_garments(job, &mut self.pyramids);
+        let worn = worn_garments(job, &mut self.looks);
         if let Some(p) = &job.placed {
             let world = p.garments.iter().map(|(_, world)| world.as_slice());
             self.garments.place(&p.world_from_camera.inverse(), world);
@@ -177,42 +177,43 @@ impl Engine {
     }
 }
 
-/// Appearance of one garment of a job.
+/// Look of one garment of a job.
 struct Worn<'a> {
     garment: &'a WornGarment,
-    /// Texture coordinates of the fit map, if it is drawn.
-    fit: Option<Vec<[f32; 2]>>,
-    appearance: Appearance,
+    /// Texture coordinates and appearance of the fit map, if it is drawn.
+    fit: Option<(Vec<[f32; 2]>, Appearance)>,
+    look: Arc<DrawnLook>,
 }
 
 impl Worn<'_> {
     fn surface(&self) -> DrawnSurface<'_> {
+        let (uv, appearance) = match &self.fit {
+            Some((uv, appearance)) => (uv, appearance),
+            None => (&self.garment.uvs, &self.look.appearance),
+        };
         DrawnSurface {
             faces: &self.garment.faces,
-            uv: self.fit.as_ref().unwrap_or(&self.garment.uvs),
+            uv,
             vertex: &self.garment.drawn,
-            appearance: &self.appearance,
+            places: &self.look.places,
+            appearance,
         }
     }
 }
 
 /// Garments of `job`, innermost first.
-fn worn_garments<'a>(job: &'a Job, pyramids: &mut Pyramids) -> Vec<Worn<'a>> {
-    pyramids.keep(job);
+fn worn_garments<'a>(job: &'a Job, looks: &mut Looks) -> Vec<Worn<'a>> {
+    looks.keep(job);
     let placed = job.placed.iter().flat_map(|p| &p.garments);
     let fits = |k: usize| job.fit.as_ref()?.get(k);
     placed
         .enumerate()
         .map(|(k, (garment, _))| {
             let fit = fits(k).and_then(|bytes| fit_scale(garment, bytes));
-            let appearance = match fit {
-                Some(_) => fit_appearance(),
-                None => appearance(garment, pyramids),
-            };
             Worn {
                 garment,
-                fit,
-                appearance,
+                fit: fit.map(|uv| (uv, fit_appearance())),
+                look: looks.of(garment),
             }
         })
         .collect()
@@ -279,67 +280,4 @@ fn fit_scale(w: &WornGarment, bytes: &[u8]) -> Option<Vec<[f32; 2]>> {
             .map(|v| [tightness(bytes[*v as usize]), 0.0])
             .collect()
     })
-}
-
-fn fit_appearance() -> Appearance {
-    let [low, base, high] = FIT_COLORS;
-    Appearance {
-        base,
-        pattern: Print::Scale { low, high },
-        ..Appearance::default()
-    }
-}
-
-fn rgb(c: u32) -> [u8; 3] {
-    let [_, r, g, b] = c.to_be_bytes();
-    [r, g, b]
-}
-
-/// Images of the garments that are worn, with their smaller copies, kept from picture to picture.
-#[derive(Default)]
-struct Pyramids(Vec<(Arc<WornImage>, Arc<ImagePyramid>)>);
-
-impl Pyramids {
-    /// Drops the images of garments that `job` lacks.
-    fn keep(&mut self, job: &Job) {
-        let worn = job.placed.iter().flat_map(|p| &p.garments);
-        let worn: Vec<_> = worn.filter_map(|(g, _)| g.image.as_ref()).collect();
-        let is_worn = |image: &Arc<WornImage>| worn.iter().any(|own| Arc::ptr_eq(own, image));
-        self.0.retain(|(image, _)| is_worn(image));
-    }
-
-    fn of(&mut self, image: &Arc<WornImage>) -> Arc<ImagePyramid> {
-        let known = self.0.iter().find(|(own, _)| Arc::ptr_eq(own, image));
-        if let Some((_, pyramid)) = known {
-            return Arc::clone(pyramid);
-        }
-        let pyramid = Arc::new(ImagePyramid::new(image.image()));
-        self.0.push((Arc::clone(image), Arc::clone(&pyramid)));
-        pyramid
-    }
-}
-
-fn appearance(garment: &WornGarment, pyramids: &mut Pyramids) -> Appearance {
-    let l = &garment.look;
-    if let Some(image) = &garment.image {
-        return Appearance {
-            base: rgb(l.color_rgb),
-            pattern: Print::Image(pyramids.of(image)),
-            ..Appearance::default()
-        };
-    }
-    let stripes = l.stripe_width > 0.0 && l.accent_rgb != l.color_rgb;
-    let pattern = if stripes {
-        Print::Stripes {
-            color: rgb(l.accent_rgb),
-            period: 2.0 * l.stripe_width,
-        }
-    } else {
-        Print::Solid
-    };
-    Appearance {
-        base: rgb(l.color_rgb),
-        pattern,
-        ..Appearance::default()
-    }
 }

@@ -27,6 +27,7 @@ mod fine_picture;
 mod formats;
 mod join_buffer;
 mod life;
+mod looks;
 mod off_person;
 pub mod page;
 #[cfg(test)]

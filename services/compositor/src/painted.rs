@@ -79,7 +79,7 @@ fn square(look: u32) -> WornGarment {
         look: GarmentLook {
             color_rgb: look,
             accent_rgb: look,
-            stripe_width: 0.0,
+            ..GarmentLook::default()
         },
         image: None,
     }

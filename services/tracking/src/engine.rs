@@ -247,6 +247,7 @@ fn status_to_wire(status: Status) -> (TrackingStatus, DegradedReason) {
         Status::Lost { reason } => {
             let why = match reason {
                 LostReason::NoPerson => DegradedReason::PersonLeft,
+                LostReason::Thing => DegradedReason::NoPerson,
                 LostReason::Residual | LostReason::Disagreement => DegradedReason::TrackingLost,
                 LostReason::NotFinite => DegradedReason::StepFailed,
             };

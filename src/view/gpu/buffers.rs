@@ -1,6 +1,5 @@
 //! Data uploaded for each picture. Layouts are those of `garments.wgsl`; padding has a name.
 
-use crate::ImagePyramid;
 use crate::appearance::{Fabric, Print};
 use crate::area::{Area, NEAR};
 use crate::contact_shadow::{ContactShadows, NO_SHADOW};
@@ -8,6 +7,7 @@ use crate::coverage::FOLD_GAP;
 use crate::shading::Shader;
 use crate::surface::Surface;
 use crate::viewport::Viewport;
+use crate::{Cloth, ImagePyramid};
 use bytemuck::{Pod, Zeroable};
 use std::sync::Arc;
 
@@ -23,6 +23,7 @@ pub(super) struct SceneData {
     key: [f32; 4],
     light: [f32; 4],
     limits: [f32; 4],
+    room: [[f32; 4]; 3],
 }
 
 impl SceneData {
@@ -56,6 +57,7 @@ impl SceneData {
             key: [shader.key.x, shader.key.y, shader.key.z, l.key],
             light: [l.ground, l.inside, l.contact, shader.brightness],
             limits: [FOLD_GAP, l.contact_depth, NO_SHADOW, behind],
+            room: shader.room_rows(),
         }
     }
 }
@@ -69,12 +71,19 @@ pub(super) struct FabricData {
     pattern: [f32; 4],
     /// First texel, columns, rows and levels of an image.
     image: [u32; 4],
+    cloth: [u32; 4],
+    sizes: [f32; 4],
+    look: [f32; 4],
+    pucker: [f32; 4],
 }
 
 impl FabricData {
-    /// A fabric whose image, if it has one, starts at texel `first`.
-    fn new(f: &Fabric, first: u32) -> Self {
+    /// A fabric whose image, if it has one, starts at texel `first`, and whose relief at `relief`.
+    fn new(f: &Fabric, first: u32, relief: u32) -> Self {
         let mut image = [0; 4];
+        let numbers = f.cloth.as_ref().map(|c| c.numbers());
+        let mut numbers = numbers.unwrap_or_default();
+        numbers.counts[0] = relief;
         let pattern = match &f.print {
             Print::Solid => [0.0, 1.0, 0.0, 0.0],
             &Print::Stripes { period, .. } => [1.0, period, 0.0, 0.0],
@@ -92,6 +101,10 @@ impl FabricData {
             other: [f.other[0], f.other[1], f.other[2], f.metres_per_uv],
             pattern,
             image,
+            cloth: numbers.counts,
+            sizes: numbers.sizes,
+            look: numbers.look,
+            pucker: numbers.pucker,
         }
     }
 }
@@ -102,6 +115,11 @@ pub(super) fn images(surface: &Surface) -> impl Iterator<Item = &Arc<ImagePyrami
         Print::Image(pyramid) => Some(pyramid),
         _ => None,
     })
+}
+
+/// Cloths of the fabrics of a surface.
+pub(super) fn cloths(surface: &Surface) -> impl Iterator<Item = &Arc<Cloth>> {
+    surface.fabrics.iter().filter_map(|f| f.cloth.as_ref())
 }
 
 /// Flag of an owner seen from inside, above the garment's number.
@@ -120,12 +138,13 @@ pub(super) fn geometry(surface: &Surface) -> [Vec<u8>; 5] {
         .zip(&surface.inner)
         .map(|(g, i)| u32::from(*g) + u32::from(*i) * INNER)
         .collect();
-    let mut first = 0;
+    let (mut first, mut relief) = (0, 0);
     let fabrics: Vec<FabricData> = surface
         .fabrics
         .iter()
         .map(|f| {
-            let data = FabricData::new(f, first);
+            let data = FabricData::new(f, first, relief);
+            relief += f.cloth.as_ref().map_or(0, |c| c.texels().count() as u32);
             if let Print::Image(pyramid) = &f.print {
                 first += pyramid.texels().len() as u32;
             }

@@ -18,6 +18,10 @@ struct Scene {
     light: vec4f,
     // Fold gap (metres), shadow depth (metres), least shadow, displacement of inner sides (metres).
     limits: vec4f,
+    // Change of the room's light with the normal over its mean: red, mean light; green, 1 where it is known; blue, lamp.
+    red: vec4f,
+    green: vec4f,
+    blue: vec4f,
 }
 
 struct Fabric {
@@ -30,13 +34,23 @@ struct Fabric {
     pattern: vec4f,
     // First texel, columns, rows and levels of an image.
     image: vec4u,
+    // First relief, levels of yarns and surface, 1 for a cloth.
+    cloth: vec4u,
+    // Sides of yarns and surface, pitch, ribs at lower edges, metres.
+    sizes: vec4f,
+    // Roughness, reflectance, fuzz, ribs at upper edges.
+    look: vec4f,
+    // Wave and place of puckers at lower and upper edges.
+    pucker: vec4f,
 }
 
 struct Attribute {
     // Normal; openness.
     normal: vec4f,
-    // Texture coordinate, depth, unused.
+    // Texture coordinate, depth, distance from a free edge.
     more: vec4f,
+    // Length along that edge, distance from a seam, 1 at an upper edge, unused.
+    place: vec4f,
 }
 
 @group(0) @binding(0) var<uniform> scene: Scene;
@@ -48,6 +62,8 @@ struct Attribute {
 @group(0) @binding(5) var<storage, read> fabrics: array<Fabric>;
 // sRGB, 0xBBGGRR, level by level, row by row.
 @group(0) @binding(6) var<storage, read> texels: array<u32>;
+// Yarns and surface of each cloth, level by level; profiles of its lower and upper edges, and of its seams.
+@group(0) @binding(7) var<storage, read> reliefs: array<vec4f>;
 @group(1) @binding(0) var faces: texture_2d<u32>;
 @group(1) @binding(1) var depths: texture_depth_2d;
 @group(2) @binding(0) var pixels: texture_2d<u32>;
@@ -191,6 +207,147 @@ fn to_srgb(light: vec3f) -> vec3f {
     return select(1.055 * pow(c, vec3f(1.0 / 2.4)) - 0.055, 12.92 * c, c <= vec3f(0.0031308));
 }
 
+// Texels of a tile with `levels` levels, and of those before level `level`.
+fn texels_before(levels: u32, level: u32) -> u32 {
+    var sum = 0u;
+    for (var k = 0u; k < level; k++) {
+        let n = 1u << (levels - 1u - k);
+        sum += n * n;
+    }
+    return sum;
+}
+
+fn tile_level(first: u32, levels: u32, side: f32, level: u32, uv: vec2f) -> vec4f {
+    let n = 1u << (levels - 1u - level);
+    let base = first + texels_before(levels, level);
+    let p = uv / side * f32(n) - 0.5;
+    let low = floor(p);
+    let w = p - low;
+    let a = vec2u(vec2i(low)) & vec2u(n - 1u);
+    let b = (a + 1u) & vec2u(n - 1u);
+    let top = mix(reliefs[base + a.y * n + a.x], reliefs[base + a.y * n + b.x], w.x);
+    let bottom = mix(reliefs[base + b.y * n + a.x], reliefs[base + b.y * n + b.x], w.x);
+    return mix(top, bottom, w.y);
+}
+
+fn tile_at(first: u32, levels: u32, side: f32, uv: vec2f, footprint: f32) -> vec4f {
+    let finest = side / f32(1u << (levels - 1u));
+    let level = log2(max(footprint / finest, 1.0));
+    let low = min(u32(level), levels - 1u);
+    if low == levels - 1u {
+        return reliefs[first + texels_before(levels, low)];
+    }
+    let a = tile_level(first, levels, side, low, uv);
+    let b = tile_level(first, levels, side, low + 1u, uv);
+    return mix(a, b, level - f32(low));
+}
+
+const PROFILE: u32 = 257u;
+const PROFILE_STEP: f32 = 2.5e-4;
+const PROFILE_REACH: f32 = 0.064;
+
+fn profile_at(first: u32, x: f32) -> vec4f {
+    let at = min(x / PROFILE_STEP, f32(PROFILE - 1u));
+    let k = min(u32(at), PROFILE - 2u);
+    return mix(reliefs[first + k], reliefs[first + k + 1u], at - f32(k));
+}
+
+// Mean slope and mean light taken: of lower and upper edges, or of seams.
+fn profile_mean(first: u32, distance: f32, footprint: f32) -> vec4f {
+    let f = max(footprint, PROFILE_STEP);
+    let lo = distance - 0.5 * f;
+    let hi = distance + 0.5 * f;
+    let side = vec4f(1.0, select(1.0, -1.0, lo < 0.0), 1.0, select(1.0, -1.0, lo < 0.0));
+    return (profile_at(first, abs(hi)) - profile_at(first, abs(lo)) * side) / f;
+}
+
+struct Relief {
+    slopes: vec4f,
+    seam: f32,
+    tone: f32,
+    variance: f32,
+}
+
+const TAU: f32 = 6.2831853;
+
+fn spread(t: vec4f) -> f32 {
+    return max(t.w - 0.5 * dot(t.xy, t.xy), 0.0);
+}
+
+fn relief_of(f: Fabric, uv: vec2f, free: f32, along: f32, seam: f32, is_upper: bool, footprint: f32) -> Relief {
+    let yarns = f.cloth.x;
+    let surface = yarns + texels_before(f.cloth.y, f.cloth.y);
+    let edges = surface + texels_before(f.cloth.z, f.cloth.z);
+    let s = tile_at(surface, f.cloth.z, f.sizes.y, uv, footprint);
+    var y = reliefs[surface - 1u];
+    if footprint < 2.0 * f.sizes.z {
+        y = tile_at(yarns, f.cloth.y, f.sizes.x, uv, footprint);
+    }
+    var out: Relief;
+    out.slopes = vec4f(s.xy + y.xy, 0.0, 0.0);
+    out.tone = 1.0 + s.z + y.z;
+    out.variance = spread(s) + spread(y);
+    let reach = PROFILE_REACH + 0.5 * footprint;
+    if free < reach {
+        let both = profile_mean(edges, free, footprint);
+        let profile = select(both.xy, both.zw, is_upper);
+        let pucker = select(f.pucker.xy, f.pucker.zw, is_upper);
+        let ribs = select(f.sizes.w, f.look.w, is_upper);
+        out.slopes.z += profile.x;
+        out.tone *= 1.0 - profile.y;
+        if free < ribs {
+            let seen = clamp(1.0 - footprint / 1.3e-3, 0.0, 1.0);
+            let turn = TAU * fract(along / 2.6e-3);
+            out.slopes.w += 0.9 * seen * cos(turn);
+            out.tone *= 1.0 - 0.12 * (1.0 - seen * sin(turn));
+            out.variance += 0.405 * (1.0 - seen);
+        }
+        if pucker.x > 0.0 {
+            let near = max(1.0 - abs(free - pucker.y) / (1.5 * pucker.x), 0.0);
+            let seen = clamp(1.0 - footprint / (0.5 * pucker.x), 0.0, 1.0);
+            let uneven = cos(TAU * fract(along / pucker.x)) + sin(TAU * fract(along / (1.7 * pucker.x)));
+            out.slopes.w += 0.09 * near * seen * uneven;
+        }
+    }
+    if seam < reach {
+        let profile = profile_mean(edges + PROFILE, seam, footprint);
+        out.seam = profile.x;
+        out.tone *= 1.0 - profile.y;
+    }
+    return out;
+}
+
+fn believed(g: vec3f) -> vec3f {
+    return select(g, vec3f(0.0), dot(g, g) > 6.25);
+}
+
+// Light of the room, or of the lamps, on a surface; `open` is the share that reaches it.
+fn irradiance(n: vec3f, open: f32) -> vec3f {
+    if scene.green.w > 0.0 {
+        let e = vec3f(1.0) + vec3f(dot(scene.red.xyz, n), dot(scene.green.xyz, n), dot(scene.blue.xyz, n));
+        return scene.red.w * 0.5 * (e + sqrt(e * e + 0.02)) * open;
+    }
+    let hemi = scene.light.x + (scene.up.w - scene.light.x) * 0.5 * (1.0 + dot(n, scene.up.xyz));
+    let key = max((dot(n, scene.key.xyz) + 0.25) / 1.25, 0.0) * scene.key.w;
+    return vec3f(hemi * open + key * min(open, 1.0));
+}
+
+fn reflected(f: Fabric, n: vec3f, eye: vec3f, open: f32, variance: f32, color: vec3f) -> vec3f {
+    let light = irradiance(n, open);
+    let away = 1.0 - clamp(dot(n, eye), 0.0, 1.0);
+    let fuzz = f.look.z * away * away * away;
+    let alpha = min(f.look.x * f.look.x + 2.0 * variance, 1.0);
+    let half_way = normalize(scene.key.xyz + eye);
+    let h = max(dot(n, half_way), 0.0);
+    let a2 = alpha * alpha;
+    let wide = h * h * (a2 - 1.0) + 1.0;
+    let lobe = a2 / (4.0 * wide * wide);
+    let edge = pow(1.0 - clamp(dot(half_way, eye), 0.0, 1.0), 5.0);
+    let fresnel = f.look.y + (1.0 - f.look.y) * edge;
+    let shine = fresnel * lobe * max(dot(n, scene.key.xyz), 0.0) * scene.blue.w * min(open, 1.0);
+    return (color * (1.0 - 0.5 * fuzz) + fuzz * (0.15 + 0.5 * color)) * light + shine;
+}
+
 // sRGB of a face at a position of the picture.
 fn shaded(face: u32, at: vec2f, shadow: f32) -> vec3f {
     let i = vec3u(corners[3u * face], corners[3u * face + 1u], corners[3u * face + 2u]);
@@ -220,7 +377,31 @@ fn shaded(face: u32, at: vec2f, shadow: f32) -> vec3f {
     }
     let facing = max(abs(dot(n, eye)), 0.2);
     let f = fabrics[owner & 255u];
-    let color = albedo(f, high.xy, high.z / (scene.camera.x * facing));
+    let footprint = high.z / (scene.camera.x * facing);
+    let color = albedo(f, high.xy, footprint);
+    let gain = scene.light.w * select(1.0, scene.light.y, inner) * (1.0 - shadow);
+    if f.cloth.w == 1u {
+        let place = attributes[i.x].place * w.x + attributes[i.y].place * w.y + attributes[i.z].place * w.z;
+        let relief = relief_of(f, high.xy * f.other.w, high.w, place.x, place.y, place.z > 0.5, footprint);
+        let across = cross(b - a, c - a);
+        let scale = 1.0 / max(dot(across, across), 1e-38);
+        let ga = cross(across, c - b) * scale;
+        let gb = cross(across, a - c) * scale;
+        let gc = cross(across, b - a) * scale;
+        let ma = attributes[i.x].more;
+        let mb = attributes[i.y].more;
+        let mc = attributes[i.z].more;
+        let pa = attributes[i.x].place;
+        let pb = attributes[i.y].place;
+        let pc = attributes[i.z].place;
+        let tilt = believed((ga * ma.x + gb * mb.x + gc * mc.x) * f.other.w) * relief.slopes.x
+            + believed((ga * ma.y + gb * mb.y + gc * mc.y) * f.other.w) * relief.slopes.y
+            + believed(ga * ma.w + gb * mb.w + gc * mc.w) * relief.slopes.z
+            + believed(ga * pa.x + gb * pb.x + gc * pc.x) * relief.slopes.w
+            + believed(ga * pa.y + gb * pb.y + gc * pc.y) * relief.seam;
+        let tilted = normalize(n - select(tilt, -tilt, inner));
+        return to_srgb(reflected(f, tilted, eye, low.w, relief.variance, color * relief.tone) * gain);
+    }
 
     let hemi = scene.light.x + (scene.up.w - scene.light.x) * 0.5 * (1.0 + dot(n, scene.up.xyz));
     let key = max((dot(n, scene.key.xyz) + 0.25) / 1.25, 0.0) * scene.key.w;
@@ -229,7 +410,6 @@ fn shaded(face: u32, at: vec2f, shadow: f32) -> vec3f {
         let half_way = max(dot(n, normalize(scene.key.xyz + eye)), 0.0);
         sheen = f.base.w * 0.25 * pow(half_way, 16.0) * scene.key.w;
     }
-    let gain = scene.light.w * select(1.0, scene.light.y, inner) * (1.0 - shadow);
     return to_srgb(color * (hemi * low.w + key * min(low.w, 1.0)) * gain + sheen * gain);
 }
 

@@ -5,8 +5,11 @@ use wgpu::{BindingType, BufferBindingType, ShaderStages, TextureSampleType};
 
 /// Source of the shaders.
 pub(super) const SHADERS: &str = include_str!("garments.wgsl");
-/// Storage buffers of the geometry group: vertices, faces, owners, attributes, fabrics, texels.
-pub(super) const STORAGE_BUFFERS: u32 = 6;
+/// Storage buffers of the geometry group: vertices, faces, owners, attributes, fabrics, texels, reliefs.
+pub(super) const STORAGE_BUFFERS: u32 = 7;
+/// Those of them that are kept from picture to picture.
+pub(super) const TEXELS: usize = 5;
+pub(super) const RELIEFS: usize = 6;
 
 /// Compiled passes and the layouts of their bind groups.
 #[derive(Debug)]

@@ -1,18 +1,19 @@
 //! [`crate::render`] on a graphics card.
 
 use super::adapter::{AdapterReport, GpuError, found, report};
-use super::buffers::{SceneData, geometry, images, shadow_texels};
+use super::buffers::{SceneData, cloths, geometry, images, shadow_texels};
 use super::passes::Passes;
-use super::pipelines::{Pipelines, STORAGE_BUFFERS};
+use super::pipelines::{Pipelines, RELIEFS, STORAGE_BUFFERS, TEXELS};
 use super::readback::{COVERAGE_BYTES, fetch, unpack};
 use super::targets::{Targets, padded_row, write};
 use crate::area::Area;
 use crate::captured_depth::AreaDepth;
 use crate::composition::Composition;
+use crate::room_light::RoomLight;
 use crate::shading::Shader;
 use crate::surface::Surface;
 use crate::{
-    Appearance, GarmentView, ImagePyramid, Input, Model, RenderError, RenderReport, State,
+    Appearance, Cloth, GarmentView, ImagePyramid, Input, Model, RenderError, RenderReport, State,
     Workspace,
 };
 use std::sync::{Arc, Mutex};
@@ -32,8 +33,10 @@ pub struct Renderer {
     scene: wgpu::Buffer,
     storage: Vec<wgpu::Buffer>,
     targets: Option<Targets>,
-    /// Images in the last storage buffer.
+    /// Images in the buffer of texels.
     images: Vec<Arc<ImagePyramid>>,
+    /// Fabrics in the buffer of reliefs.
+    cloths: Vec<Arc<Cloth>>,
     failure: Failure,
 }
 
@@ -85,6 +88,7 @@ impl Renderer {
             queue,
             targets: None,
             images: Vec::new(),
+            cloths: Vec::new(),
             failure,
         };
         renderer.warm_up().map_err(|e| refused(e.to_string()))?;
@@ -110,6 +114,7 @@ impl Renderer {
             faces: &[[0, 1, 2]],
             uv: &[],
             normals: &[],
+            places: &[],
             appearance: &Appearance::default(),
         };
         let input = Input {
@@ -141,9 +146,11 @@ impl Renderer {
         let Some(area) = picture.area else {
             return Ok(picture.end(work));
         };
+        picture.see_body(model, state, input, work, &area);
         work.surface.visible.reset(work.surface.faces.len(), true);
         work.surface.shade_vertices(&model.config.lights);
-        self.upload(model, &picture, &area, work);
+        let room = state.room_light.map(|(light, _)| light);
+        self.upload(model, &picture, &area, room.as_ref(), work);
         let targets = self.take_targets(&area, picture.samples);
         let passes = self.passes(&targets, area, picture.samples);
         self.rasterise(&passes, work)?;
@@ -161,13 +168,21 @@ impl Renderer {
     }
 
     /// Uploads camera, lights and geometry.
-    fn upload(&mut self, model: &Model, picture: &Composition<'_>, area: &Area, work: &Workspace) {
+    fn upload(
+        &mut self,
+        model: &Model,
+        picture: &Composition<'_>,
+        area: &Area,
+        room: Option<&RoomLight>,
+        work: &Workspace,
+    ) {
         let config = &model.config;
         let shader = Shader::new(
             &work.surface,
             picture.viewport.camera,
             &model.to_srgb,
             &config.lights,
+            room,
             picture.report.brightness,
         );
         let (viewport, samples) = (&picture.viewport, picture.samples);
@@ -178,6 +193,19 @@ impl Renderer {
             self.store(slot, bytes);
         }
         self.upload_images(&work.surface);
+        self.upload_cloths(&work.surface);
+    }
+
+    /// Uploads yarns, surfaces and edges of the fabrics unless they are those of the last picture.
+    fn upload_cloths(&mut self, surface: &Surface) {
+        let is_same = |(a, b): (&Arc<Cloth>, &Arc<Cloth>)| Arc::ptr_eq(a, b);
+        let count = cloths(surface).count();
+        if count == self.cloths.len() && cloths(surface).zip(&self.cloths).all(is_same) {
+            return;
+        }
+        self.cloths = cloths(surface).cloned().collect();
+        let reliefs: Vec<[f32; 4]> = self.cloths.iter().flat_map(|c| c.texels()).collect();
+        self.store(RELIEFS, bytemuck::cast_slice(&reliefs));
     }
 
     /// Uploads the images of the fabrics unless they are those of the last picture.
@@ -194,7 +222,7 @@ impl Renderer {
             .flat_map(|i| i.texels())
             .copied()
             .collect();
-        self.store(self.storage.len() - 1, bytemuck::cast_slice(&texels));
+        self.store(TEXELS, bytemuck::cast_slice(&texels));
     }
 
     /// Writes a storage buffer, a larger one where it has to be.
@@ -310,9 +338,10 @@ fn storage_buffer(device: &wgpu::Device, size: u64) -> wgpu::Buffer {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::edge_places;
     use crate::tests::fixture::{RED, SKIN, Scenery, draw};
     use crate::{Config, Print};
-    use tryon_garment::FabricImage;
+    use tryon_garment::{FabricImage, FabricSample};
 
     /// An adapter, or a loud skip; an error when everything is required.
     fn renderer() -> Option<Renderer> {
@@ -397,6 +426,41 @@ mod tests {
                 assert!(
                     a.pixels_drawn > 3000
                         && a.pixels_drawn.abs_diff(b.pixels_drawn) * 200 < a.pixels_drawn
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn cloth_on_the_card_equals_that_on_the_processor() {
+        let Some(mut card) = renderer() else { return };
+        let mut scenery = Scenery::resting(3, RED, SKIN, 1.0);
+        let vertex: Vec<u32> = (0..scenery.uv.len() as u32).collect();
+        let places = edge_places(&scenery.shirt.faces, &scenery.uv, &vertex);
+        for name in ["jersey", "fleece", "denim", "silk"] {
+            let look = FabricSample::named(name).expect("a preset").look;
+            scenery.appearance.cloth = Some(Arc::new(Cloth::new(look)));
+            for output in [None, Some([500, 300]), Some([1200, 900])] {
+                let garments = [GarmentView {
+                    places: &places,
+                    ..scenery.garment()
+                }];
+                let input = Input {
+                    body: Some(scenery.body_view()),
+                    ..scenery.input(&garments, output)
+                };
+                let model = Model::default();
+                let (cpu, a) = draw(&model, &input).expect("processor");
+                let (gpu, _) = draw_on(&mut card, &model, &input).expect("card");
+                let pairs = cpu.data().chunks(3).zip(gpu.data().chunks(3));
+                let far = pairs.filter(|(p, q)| p.iter().zip(*q).any(|(p, q)| p.abs_diff(*q) > 3));
+                let far = far.count();
+                assert!(a.pixels_drawn > 3000, "{name} {output:?}");
+                // Samples exactly on an outline are filled differently.
+                assert!(
+                    far * 50 <= a.pixels_drawn,
+                    "{name}: {far} of {} differ",
+                    a.pixels_drawn
                 );
             }
         }

@@ -260,6 +260,7 @@ impl Scenery {
             faces: &self.shirt.faces,
             uv: &self.uv,
             normals: &[],
+            places: &[],
             appearance: &self.appearance,
         }
     }

@@ -16,7 +16,10 @@ fn draw_with(s: &Scenery, state: &mut State, limbs: Option<&Limbs>) -> (ColorIma
         body,
         ..s.input(&garments, None)
     };
-    render(&Model::default(), state, &input, &mut Workspace::default()).expect("drawn")
+    // The light of the room would change with what is seen of the body.
+    let mut model = Model::default();
+    model.config.room_light.interval = f64::INFINITY;
+    render(&model, state, &input, &mut Workspace::default()).expect("drawn")
 }
 
 #[test]

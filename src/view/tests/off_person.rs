@@ -69,6 +69,7 @@ impl BesidePerson {
             faces: &FACES,
             uv: &[],
             normals: &[],
+            places: &[],
             appearance: &self.appearance,
         };
         let body = BodyView {

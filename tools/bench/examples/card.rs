@@ -16,7 +16,7 @@ use tryon::garment::{Size, library};
 use tryon::geometry::camera::ColorImage;
 use tryon::geometry::math::order_statistics::percentile;
 use tryon::geometry::math::{P3, World};
-use tryon::mirror::{CameraGarments, DrawnSurface, library_appearance};
+use tryon::mirror::{CameraGarments, DrawnLook, DrawnSurface, library_appearance};
 use tryon::synth::{Actor, Sequence, Setting};
 use tryon::view::gpu::Renderer;
 use tryon::view::{
@@ -68,12 +68,19 @@ fn main() {
         &world_from_camera.inverse(),
         world.iter().map(Vec::as_slice),
     );
-    let appearances = ["tshirt", "skirt"].map(library_appearance);
-    let surfaces = (meshes.iter().zip(&appearances)).map(|(mesh, appearance)| DrawnSurface {
+    let looks: Vec<DrawnLook> = meshes
+        .iter()
+        .map(|mesh| {
+            let appearance = library_appearance(&mesh.name);
+            DrawnLook::of(&mesh.render, &mesh.material.name, appearance)
+        })
+        .collect();
+    let surfaces = (meshes.iter().zip(&looks)).map(|(mesh, look)| DrawnSurface {
         faces: &mesh.render.faces,
         uv: &mesh.render.uv,
         vertex: &mesh.render.vertex,
-        appearance,
+        places: &look.places,
+        appearance: &look.appearance,
     });
     let garments = camera.views(surfaces);
     let template = &sequence.actor().template;

@@ -49,6 +49,7 @@ pub(crate) fn run(args: &CompositeArgs) -> Result<ExitCode> {
             faces: &g.faces,
             uv: &g.uv,
             normals: &[],
+            places: &[],
             appearance: &g.appearance,
         })
         .collect();

@@ -100,7 +100,8 @@ fn words(status: Status) -> &'static str {
         Status::Lost { reason } => match reason {
             LostReason::NoPerson => "lost: nobody of a body's size",
             LostReason::Residual => "lost: the body explains too little of the picture",
-            LostReason::Disagreement => "lost: the body contradicts the picture, or is no person",
+            LostReason::Disagreement => "lost: the body contradicts the picture",
+            LostReason::Thing => "lost: what was followed is no person",
             LostReason::NotFinite => "lost: the fit was not finite",
         },
     }

@@ -302,7 +302,7 @@ impl<'a> Animation<'a> {
             }
         }
         motion.push(self.files.read_body()?);
-        let colors = preview.mirror.appearances().iter().map(|a| a.base);
+        let colors = preview.mirror.looks().iter().map(|l| l.appearance.base);
         let garments = outfit.garments().iter().zip(colors);
         let surfaces = garments
             .map(|(g, color)| {

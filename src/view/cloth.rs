@@ -1,0 +1,179 @@
+//! A fabric prepared for shading: yarns, uneven surface, and profiles of its sewn edges.
+
+use super::cloth_tile::{ClothTexel, ClothTile};
+use super::construction::EdgePlace;
+use super::edge_profile::EdgeProfile;
+use tryon_garment::FabricLook;
+
+/// Footprint of a pixel in pitches from which yarns are roughness alone.
+const YARNS_SEEN: f32 = 2.0;
+/// Distance of two ribs, metres, their slope at its steepest, and the light lost between them.
+const RIB: f32 = 2.6e-3;
+const RIB_SLOPE: f32 = 0.9;
+const RIB_SHADE: f32 = 0.12;
+/// Steepest slope of puckers along an edge.
+const PUCKER: f32 = 0.09;
+
+/// Look of a fabric, prepared once and shared.
+#[derive(Clone, Debug)]
+pub struct Cloth {
+    pub(crate) look: FabricLook,
+    yarns: ClothTile,
+    surface: ClothTile,
+    seam: EdgeProfile,
+    lower: EdgeProfile,
+    upper: EdgeProfile,
+}
+
+impl PartialEq for Cloth {
+    fn eq(&self, other: &Self) -> bool {
+        self.look == other.look
+    }
+}
+
+/// Relief and tone of a pixel.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct ClothSample {
+    /// Slopes along u and v, across and along the nearest free edge, and across the nearest seam.
+    pub(crate) slopes: [f32; 5],
+    /// Factor on the albedo.
+    pub(crate) tone: f32,
+    /// Variance of a slope within the pixel.
+    pub(crate) variance: f32,
+}
+
+impl Cloth {
+    /// Prepares a look.
+    pub fn new(look: FabricLook) -> Self {
+        Self {
+            yarns: ClothTile::yarns(&look),
+            surface: ClothTile::surface(&look),
+            seam: EdgeProfile::seam(look.bulk),
+            lower: EdgeProfile::free(look.lower, look.bulk),
+            upper: EdgeProfile::free(look.upper, look.bulk),
+            look,
+        }
+    }
+
+    /// Mean over about `footprint` metres at a place of the pattern (metres).
+    #[inline]
+    pub(crate) fn sample(&self, uv: [f32; 2], place: &EdgePlace, footprint: f32) -> ClothSample {
+        let surface = self.surface.sample(uv, footprint);
+        let yarns = if footprint < YARNS_SEEN * self.look.pitch {
+            self.yarns.sample(uv, footprint)
+        } else {
+            self.yarns.mean()
+        };
+        let variance = |t: &ClothTexel| (t[3] - 0.5 * (t[0] * t[0] + t[1] * t[1])).max(0.0);
+        let mut out = ClothSample {
+            slopes: [surface[0] + yarns[0], surface[1] + yarns[1], 0.0, 0.0, 0.0],
+            tone: 1.0 + surface[2] + yarns[2],
+            variance: variance(&surface) + variance(&yarns),
+        };
+        let reach = EdgeProfile::REACH + 0.5 * footprint;
+        if place.free < reach {
+            let profile = if place.is_upper {
+                &self.upper
+            } else {
+                &self.lower
+            };
+            edge(
+                profile,
+                place.free,
+                place.along,
+                footprint,
+                &mut out,
+                [2, 3],
+            );
+        }
+        if place.seam < reach {
+            let [slope, taken] = self.seam.mean(place.seam, footprint);
+            out.slopes[4] += slope;
+            out.tone *= 1.0 - taken;
+        }
+        out
+    }
+}
+
+/// Numbers of a cloth for the graphics card; the layout is that of `garments.wgsl`.
+#[cfg(feature = "gpu")]
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct ClothNumbers {
+    /// First texel of its relief, levels of yarns and of the surface, 1 for a cloth and 0 for none.
+    pub(crate) counts: [u32; 4],
+    /// Sides of yarns and surface, pitch, band of ribs at lower edges, metres.
+    pub(crate) sizes: [f32; 4],
+    /// Roughness, reflectance, fuzz, band of ribs at upper edges.
+    pub(crate) look: [f32; 4],
+    /// Wave and place of the puckers at lower and at upper edges, metres.
+    pub(crate) pucker: [f32; 4],
+}
+
+#[cfg(feature = "gpu")]
+impl Cloth {
+    pub(crate) fn numbers(&self) -> ClothNumbers {
+        let look = &self.look;
+        let [lower, upper] = [&self.lower, &self.upper];
+        ClothNumbers {
+            counts: [
+                0,
+                self.yarns.levels() as u32,
+                self.surface.levels() as u32,
+                1,
+            ],
+            sizes: [
+                self.yarns.side(),
+                self.surface.side(),
+                look.pitch,
+                lower.ribs,
+            ],
+            look: [look.roughness, look.specular, look.fuzz, upper.ribs],
+            pucker: [
+                lower.pucker[0],
+                lower.pucker[1],
+                upper.pucker[0],
+                upper.pucker[1],
+            ],
+        }
+    }
+
+    /// Yarns and surface, level by level, then relief and light taken of lower and upper edges, then of seams.
+    pub(crate) fn texels(&self) -> impl Iterator<Item = ClothTexel> + '_ {
+        let edges = self.lower.rows().zip(self.upper.rows());
+        let edges = edges.map(|([a, b], [c, d])| [a, b, c, d]);
+        let seams = self.seam.rows().map(|[a, b]| [a, b, 0.0, 0.0]);
+        (self.yarns.texels().chain(self.surface.texels()))
+            .copied()
+            .chain(edges)
+            .chain(seams)
+    }
+}
+
+/// Adds a free edge: its profile, ribs across a band, puckers beside stitches.
+fn edge(
+    profile: &EdgeProfile,
+    distance: f32,
+    along: f32,
+    footprint: f32,
+    out: &mut ClothSample,
+    [across, lengthwise]: [usize; 2],
+) {
+    let [slope, taken] = profile.mean(distance, footprint);
+    out.slopes[across] += slope;
+    out.tone *= 1.0 - taken;
+    let seen = |wave: f32| (1.0 - footprint / (0.5 * wave)).clamp(0.0, 1.0);
+    let turn = |wave: f32| std::f32::consts::TAU * (along / wave).fract();
+    if distance < profile.ribs {
+        let (s, c) = turn(RIB).sin_cos();
+        out.slopes[lengthwise] += RIB_SLOPE * seen(RIB) * c;
+        out.tone *= 1.0 - RIB_SHADE * (1.0 - seen(RIB) * s);
+        out.variance += 0.5 * RIB_SLOPE * RIB_SLOPE * (1.0 - seen(RIB));
+    }
+    let [wave, at] = profile.pucker;
+    if wave > 0.0 {
+        let near = (1.0 - (distance - at).abs() / (1.5 * wave)).max(0.0);
+        // Two waves that don't repeat together: no two puckers are alike.
+        let uneven = turn(wave).cos() + turn(1.7 * wave).sin();
+        out.slopes[lengthwise] += PUCKER * near * seen(wave) * uneven;
+    }
+}
