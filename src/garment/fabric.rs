@@ -12,7 +12,7 @@ pub struct FabricSample {
     pub drape_coefficient: Option<f64>,
     /// Fields that are no measurement of this fabric.
     pub estimated: Vec<String>,
-    /// What it looks like.
+    /// Its look.
     pub look: FabricLook,
 }
 

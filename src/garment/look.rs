@@ -1,4 +1,4 @@
-//! What a fabric looks like: its yarns, its surface, and how it is sewn.
+//! Look of a fabric: its yarns, its surface, and how it is sewn.
 
 use serde::{Deserialize, Serialize};
 

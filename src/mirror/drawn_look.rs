@@ -1,8 +1,8 @@
-//! What does not change of a garment's picture: fabric, and places of its surface in the pattern.
+//! The part of a garment's picture that does not change: fabric, and places of its surface in the pattern.
 
 use std::sync::Arc;
 use tryon_garment::{FabricSample, RenderMesh};
-use tryon_view::{Appearance, Cloth, EdgePlace, Print, edge_places};
+use tryon_view::{Appearance, EdgePlace, Print, ShadedCloth, edge_places};
 
 /// Look of a garment, prepared once.
 #[derive(Clone, Debug, PartialEq)]
@@ -26,7 +26,7 @@ impl DrawnLook {
         let look = FabricSample::named(fabric).map(|f| f.look);
         Self {
             appearance: Appearance {
-                cloth: Some(Arc::new(Cloth::new(look.unwrap_or_default()))),
+                cloth: Some(Arc::new(ShadedCloth::new(look.unwrap_or_default()))),
                 ..appearance
             },
             places: edge_places(&mesh.faces, &mesh.uv, &mesh.vertex),

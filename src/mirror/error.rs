@@ -27,7 +27,7 @@ pub enum MirrorError {
     Dress(#[source] DressError),
     /// The cloth cannot be stepped.
     #[error(transparent)]
-    Cloth(#[from] ClothError),
+    ShadedCloth(#[from] ClothError),
     /// The picture cannot be drawn.
     #[error(transparent)]
     Render(#[from] RenderError),

@@ -1,6 +1,6 @@
 //! Colour and pattern of fabrics, in sRGB and linear light.
 
-use super::cloth::Cloth;
+use super::cloth::ShadedCloth;
 use super::image_pyramid::ImagePyramid;
 use super::srgb::linear;
 use serde::{Deserialize, Serialize};
@@ -19,7 +19,7 @@ pub struct Appearance {
     pub metres_per_uv: f32,
     /// Yarns, uneven surface and sewn edges; `None` for a smooth sheet.
     #[serde(skip)]
-    pub cloth: Option<Arc<Cloth>>,
+    pub cloth: Option<Arc<ShadedCloth>>,
 }
 
 /// A fabric's pattern over its texture coordinates.
@@ -80,7 +80,7 @@ pub(crate) struct Fabric {
     pub(crate) print: Print,
     pub(crate) gloss: f32,
     pub(crate) metres_per_uv: f32,
-    pub(crate) cloth: Option<Arc<Cloth>>,
+    pub(crate) cloth: Option<Arc<ShadedCloth>>,
 }
 
 /// Mean of a square wave (half on) over a pixel of `width` periods centred at `x` periods.

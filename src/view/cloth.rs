@@ -16,7 +16,7 @@ const PUCKER: f32 = 0.09;
 
 /// Look of a fabric, prepared once and shared.
 #[derive(Clone, Debug)]
-pub struct Cloth {
+pub struct ShadedCloth {
     pub(crate) look: FabricLook,
     yarns: ClothTile,
     surface: ClothTile,
@@ -25,7 +25,7 @@ pub struct Cloth {
     upper: EdgeProfile,
 }
 
-impl PartialEq for Cloth {
+impl PartialEq for ShadedCloth {
     fn eq(&self, other: &Self) -> bool {
         self.look == other.look
     }
@@ -42,7 +42,7 @@ pub(crate) struct ClothSample {
     pub(crate) variance: f32,
 }
 
-impl Cloth {
+impl ShadedCloth {
     /// Prepares a look.
     pub fn new(look: FabricLook) -> Self {
         Self {
@@ -110,7 +110,7 @@ pub(crate) struct ClothNumbers {
 }
 
 #[cfg(feature = "gpu")]
-impl Cloth {
+impl ShadedCloth {
     pub(crate) fn numbers(&self) -> ClothNumbers {
         let look = &self.look;
         let [lower, upper] = [&self.lower, &self.upper];

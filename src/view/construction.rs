@@ -40,7 +40,7 @@ struct OutlinePiece {
 
 /// Pieces of one panel's outline.
 #[derive(Default)]
-struct Outline {
+struct PanelBorders {
     free: Vec<OutlinePiece>,
     seams: Vec<OutlinePiece>,
 }
@@ -78,7 +78,7 @@ fn outlines(
     vertex: &[u32],
     panel: &[u32],
     count: usize,
-) -> Vec<Outline> {
+) -> Vec<PanelBorders> {
     let sewn = |[a, b]: [u32; 2]| undirected([a, b].map(|v| vertex[v as usize]));
     let borders = boundary_edges(faces);
     let mut uses: BTreeMap<[u32; 2], usize> = BTreeMap::new();
@@ -90,7 +90,7 @@ fn outlines(
         let [low, high] = &mut heights[*p as usize];
         (*low, *high) = (low.min(at[1]), high.max(at[1]));
     }
-    let mut out: Vec<Outline> = (0..count).map(|_| Outline::default()).collect();
+    let mut out: Vec<PanelBorders> = (0..count).map(|_| PanelBorders::default()).collect();
     let mut next: BTreeMap<u32, u32> = BTreeMap::new();
     for edge in &borders {
         let p = panel[edge[0] as usize] as usize;

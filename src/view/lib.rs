@@ -102,7 +102,7 @@ pub(crate) mod viewport;
 mod workspace;
 
 pub use appearance::{Appearance, Print};
-pub use cloth::Cloth;
+pub use cloth::ShadedCloth;
 pub use config::{Config, Framing, Lights, Margins, Model};
 pub use construction::{EdgePlace, edge_places};
 pub use image_pyramid::ImagePyramid;

@@ -1,7 +1,7 @@
 //! Light on cloth: hemisphere light, one key lamp, openness of folds, the inner side.
 
 use super::appearance::Fabric;
-use super::cloth::Cloth;
+use super::cloth::ShadedCloth;
 use super::config::Lights;
 use super::construction::EdgePlace;
 use super::room_light::RoomLight;
@@ -221,7 +221,7 @@ impl ClothLight<'_> {
     /// Diffuse light, a microfacet highlight (GGX) of the lamp, and the sheen of fibres that stand off (after Estevez & Kulla
     /// 2017: strongest along the surface).
     #[inline]
-    fn reflected(&self, cloth: &Cloth, variance: f32, albedo: [f32; 3]) -> [f32; 3] {
+    fn reflected(&self, cloth: &ShadedCloth, variance: f32, albedo: [f32; 3]) -> [f32; 3] {
         let (n, look) = (&self.normal, &cloth.look);
         let light = self.shader.irradiance(n, self.open);
         let facing = n.dot(&self.eye).clamp(0.0, 1.0);

@@ -7,7 +7,7 @@ use crate::coverage::FOLD_GAP;
 use crate::shading::Shader;
 use crate::surface::Surface;
 use crate::viewport::Viewport;
-use crate::{Cloth, ImagePyramid};
+use crate::{ImagePyramid, ShadedCloth};
 use bytemuck::{Pod, Zeroable};
 use std::sync::Arc;
 
@@ -118,7 +118,7 @@ pub(super) fn images(surface: &Surface) -> impl Iterator<Item = &Arc<ImagePyrami
 }
 
 /// Cloths of the fabrics of a surface.
-pub(super) fn cloths(surface: &Surface) -> impl Iterator<Item = &Arc<Cloth>> {
+pub(super) fn cloths(surface: &Surface) -> impl Iterator<Item = &Arc<ShadedCloth>> {
     surface.fabrics.iter().filter_map(|f| f.cloth.as_ref())
 }
 

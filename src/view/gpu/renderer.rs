@@ -13,8 +13,8 @@ use crate::room_light::RoomLight;
 use crate::shading::Shader;
 use crate::surface::Surface;
 use crate::{
-    Appearance, Cloth, GarmentView, ImagePyramid, Input, Model, RenderError, RenderReport, State,
-    Workspace,
+    Appearance, GarmentView, ImagePyramid, Input, Model, RenderError, RenderReport, ShadedCloth,
+    State, Workspace,
 };
 use std::sync::{Arc, Mutex};
 use tryon_geometry::camera::{Calibration, ColorImage, DepthImage, Intrinsics, RgbdFrame};
@@ -36,7 +36,7 @@ pub struct Renderer {
     /// Images in the buffer of texels.
     images: Vec<Arc<ImagePyramid>>,
     /// Fabrics in the buffer of reliefs.
-    cloths: Vec<Arc<Cloth>>,
+    cloths: Vec<Arc<ShadedCloth>>,
     failure: Failure,
 }
 
@@ -198,7 +198,7 @@ impl Renderer {
 
     /// Uploads yarns, surfaces and edges of the fabrics unless they are those of the last picture.
     fn upload_cloths(&mut self, surface: &Surface) {
-        let is_same = |(a, b): (&Arc<Cloth>, &Arc<Cloth>)| Arc::ptr_eq(a, b);
+        let is_same = |(a, b): (&Arc<ShadedCloth>, &Arc<ShadedCloth>)| Arc::ptr_eq(a, b);
         let count = cloths(surface).count();
         if count == self.cloths.len() && cloths(surface).zip(&self.cloths).all(is_same) {
             return;
@@ -439,7 +439,7 @@ mod tests {
         let places = edge_places(&scenery.shirt.faces, &scenery.uv, &vertex);
         for name in ["jersey", "fleece", "denim", "silk"] {
             let look = FabricSample::named(name).expect("a preset").look;
-            scenery.appearance.cloth = Some(Arc::new(Cloth::new(look)));
+            scenery.appearance.cloth = Some(Arc::new(ShadedCloth::new(look)));
             for output in [None, Some([500, 300]), Some([1200, 900])] {
                 let garments = [GarmentView {
                     places: &places,
