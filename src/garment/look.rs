@@ -58,7 +58,7 @@ pub struct FabricLook {
     pub pitch: f32,
     /// Height of the relief over the pitch.
     pub relief: f32,
-    /// Root mean square slope of the uneven surface, at wavelengths from 4 to 30 mm.
+    /// Root mean square slope of the uneven surface, at wavelengths of 3 and 6 mm.
     pub unevenness: f32,
     /// Root mean square of the tone's variation by uneven yarns and dye, as a share.
     pub mottle: f32,
@@ -83,8 +83,8 @@ impl Default for FabricLook {
             structure: Structure::Jersey,
             pitch: 7e-4,
             relief: 0.35,
-            unevenness: 0.05,
-            mottle: 0.03,
+            unevenness: 0.035,
+            mottle: 0.02,
             roughness: 0.7,
             specular: 0.03,
             fuzz: 0.25,

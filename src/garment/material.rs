@@ -135,6 +135,15 @@ impl Material {
         const MOST: f64 = 0.12;
         (TENSION / self.stretch_warp.min(self.stretch_weft)).min(MOST)
     }
+    /// Length of wrinkles in the sheet, metres: 2 √π (B/T)^¼ √L (Cerda & Mahadevan 2003) of a strip as long as a fold between
+    /// two places that hold it, under the tension of a worn garment.
+    pub fn wrinkle_length(&self) -> f64 {
+        /// Tension T, N/m, and length L, metres.
+        const TENSION: f64 = 10.0;
+        const LENGTH: f64 = 0.06;
+        let stiffness = (self.bending.warp * self.bending.weft).max(0.0).sqrt();
+        2.0 * (std::f64::consts::PI * LENGTH).sqrt() * (stiffness / TENSION).powf(0.25)
+    }
     /// Geometric mean of both Poisson ratios ν, of ν/(1 − ν²) = λ/√(E₁ E₂).
     pub fn poisson(&self) -> f64 {
         let ratio = self.coupling / (self.stretch_warp * self.stretch_weft).sqrt();

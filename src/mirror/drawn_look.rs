@@ -23,10 +23,12 @@ impl DrawnLook {
                 places: Vec::new(),
             };
         }
-        let look = FabricSample::named(fabric).map(|f| f.look);
+        let cloth = FabricSample::named(fabric)
+            .map(|f| ShadedCloth::new(f.look, f.material.wrinkle_length() as f32))
+            .unwrap_or_default();
         Self {
             appearance: Appearance {
-                cloth: Some(Arc::new(ShadedCloth::new(look.unwrap_or_default()))),
+                cloth: Some(Arc::new(cloth)),
                 ..appearance
             },
             places: edge_places(&mesh.faces, &mesh.uv, &mesh.vertex),

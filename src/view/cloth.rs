@@ -3,6 +3,7 @@
 use super::cloth_tile::{ClothTexel, ClothTile};
 use super::construction::EdgePlace;
 use super::edge_profile::EdgeProfile;
+use std::f32::consts::PI;
 use tryon_garment::FabricLook;
 
 /// Footprint of a pixel in pitches from which yarns are roughness alone.
@@ -14,15 +15,34 @@ const RIB_SHADE: f32 = 0.12;
 /// Steepest slope of puckers along an edge.
 const PUCKER: f32 = 0.09;
 
+/// Length of jersey's wrinkles, metres.
+const WAVE: f32 = 0.026;
+/// Compression below which no wrinkle is seen, and above which none gets steeper.
+const COMPRESSED: [f32; 2] = [5e-4, 0.08];
+/// Share of a compression that wrinkles take up.
+const TAKEN_UP: f32 = 1.0;
+/// Directions for which the tile of wrinkles is turned.
+const TURNS: f32 = 8.0;
+/// Light lost in valleys of wrinkles, per slope.
+const WRINKLE_SHADE: f32 = 0.12;
+
 /// Look of a fabric, prepared once and shared.
 #[derive(Clone, Debug)]
 pub struct ShadedCloth {
     pub(crate) look: FabricLook,
     yarns: ClothTile,
     surface: ClothTile,
+    wrinkles: ClothTile,
     seam: EdgeProfile,
     lower: EdgeProfile,
     upper: EdgeProfile,
+}
+
+impl Default for ShadedCloth {
+    /// Jersey.
+    fn default() -> Self {
+        Self::new(FabricLook::default(), WAVE)
+    }
 }
 
 impl PartialEq for ShadedCloth {
@@ -43,11 +63,12 @@ pub(crate) struct ClothSample {
 }
 
 impl ShadedCloth {
-    /// Prepares a look.
-    pub fn new(look: FabricLook) -> Self {
+    /// Prepares a look whose wrinkles are `wave` metres long.
+    pub fn new(look: FabricLook, wave: f32) -> Self {
         Self {
             yarns: ClothTile::yarns(&look),
             surface: ClothTile::surface(&look),
+            wrinkles: ClothTile::wrinkles(wave),
             seam: EdgeProfile::seam(look.bulk),
             lower: EdgeProfile::free(look.lower, look.bulk),
             upper: EdgeProfile::free(look.upper, look.bulk),
@@ -57,7 +78,13 @@ impl ShadedCloth {
 
     /// Mean over about `footprint` metres at a place of the pattern (metres).
     #[inline]
-    pub(crate) fn sample(&self, uv: [f32; 2], place: &EdgePlace, footprint: f32) -> ClothSample {
+    pub(crate) fn sample(
+        &self,
+        uv: [f32; 2],
+        place: &EdgePlace,
+        compression: [f32; 2],
+        footprint: f32,
+    ) -> ClothSample {
         let surface = self.surface.sample(uv, footprint);
         let yarns = if footprint < YARNS_SEEN * self.look.pitch {
             self.yarns.sample(uv, footprint)
@@ -70,6 +97,7 @@ impl ShadedCloth {
             tone: 1.0 + surface[2] + yarns[2],
             variance: variance(&surface) + variance(&yarns),
         };
+        self.wrinkle(uv, compression, footprint, &mut out);
         let reach = EdgeProfile::REACH + 0.5 * footprint;
         if place.free < reach {
             let profile = if place.is_upper {
@@ -95,11 +123,39 @@ impl ShadedCloth {
     }
 }
 
+impl ShadedCloth {
+    /// Adds wrinkles across the direction of compression, ε (cos 2θ, sin 2θ). A sine of wavelength λ and amplitude a takes up
+    /// ε = (π a/λ)², so that its slopes have a root mean square of √(2 ε). Between the directions for which the tile is
+    /// turned, the two nearest are mixed: it moves with the pattern, never with the direction.
+    fn wrinkle(&self, uv: [f32; 2], [x, y]: [f32; 2], footprint: f32, out: &mut ClothSample) {
+        let strain = x.hypot(y);
+        if strain < COMPRESSED[0] {
+            return;
+        }
+        let strain = (strain - COMPRESSED[0]).min(COMPRESSED[1]) * TAKEN_UP;
+        let steep = (2.0 * strain).sqrt();
+        let turn = (0.5 * y.atan2(x) * TURNS / PI).rem_euclid(TURNS);
+        let first = turn.floor();
+        let part = turn - first;
+        // Independent fields: their squares add up.
+        for (k, share) in [(first, (1.0 - part).sqrt()), (first + 1.0, part.sqrt())] {
+            // Half a turn is none.
+            let (s, c) = (k % TURNS * PI / TURNS).sin_cos();
+            let turned = [uv[0] * c + uv[1] * s, uv[1] * c - uv[0] * s];
+            let t = self.wrinkles.sample(turned, footprint);
+            let gain = steep * share;
+            out.slopes[0] += gain * (t[0] * c - t[1] * s);
+            out.slopes[1] += gain * (t[0] * s + t[1] * c);
+            out.tone *= 1.0 + WRINKLE_SHADE * gain * t[2];
+        }
+    }
+}
+
 /// Numbers of a cloth for the graphics card; the layout is that of `garments.wgsl`.
 #[cfg(feature = "gpu")]
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct ClothNumbers {
-    /// First texel of its relief, levels of yarns and of the surface, 1 for a cloth and 0 for none.
+    /// First texel of its relief, levels of yarns, of the surface and of wrinkles; no levels without a cloth.
     pub(crate) counts: [u32; 4],
     /// Sides of yarns and surface, pitch, band of ribs at lower edges, metres.
     pub(crate) sizes: [f32; 4],
@@ -107,6 +163,8 @@ pub(crate) struct ClothNumbers {
     pub(crate) look: [f32; 4],
     /// Wave and place of the puckers at lower and at upper edges, metres.
     pub(crate) pucker: [f32; 4],
+    /// Side of the wrinkles, metres; unused.
+    pub(crate) wrinkle: [f32; 4],
 }
 
 #[cfg(feature = "gpu")]
@@ -119,7 +177,7 @@ impl ShadedCloth {
                 0,
                 self.yarns.levels() as u32,
                 self.surface.levels() as u32,
-                1,
+                self.wrinkles.levels() as u32,
             ],
             sizes: [
                 self.yarns.side(),
@@ -134,15 +192,17 @@ impl ShadedCloth {
                 upper.pucker[0],
                 upper.pucker[1],
             ],
+            wrinkle: [self.wrinkles.side(), 0.0, 0.0, 0.0],
         }
     }
 
-    /// Yarns and surface, level by level, then relief and light taken of lower and upper edges, then of seams.
+    /// Yarns, surface and wrinkles, level by level, then relief and light taken of lower and upper edges, then of seams.
     pub(crate) fn texels(&self) -> impl Iterator<Item = ClothTexel> + '_ {
         let edges = self.lower.rows().zip(self.upper.rows());
         let edges = edges.map(|([a, b], [c, d])| [a, b, c, d]);
         let seams = self.seam.rows().map(|[a, b]| [a, b, 0.0, 0.0]);
         (self.yarns.texels().chain(self.surface.texels()))
+            .chain(self.wrinkles.texels())
             .copied()
             .chain(edges)
             .chain(seams)

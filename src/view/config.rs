@@ -40,9 +40,9 @@ settings! {
         /// Reach of a contact shadow behind a garment's edge, metres.
         pub contact_depth: f32 = 0.10,
         /// Ambient light lost in a fold whose flanks rise at 45°.
-        pub fold_shade: f32 = 0.9,
+        pub fold_shade: f32 = 1.2,
         /// Least and greatest openness.
-        pub openness: [f32; 2] = [0.6, 1.08],
+        pub openness: [f32; 2] = [0.55, 1.1],
     }
 
     /// Depth margins by which a captured pixel hides a garment, metres, on top of twice the sensor's noise at that depth.

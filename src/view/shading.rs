@@ -55,7 +55,7 @@ impl Default for ShadedFace {
         Self {
             face: u32::MAX,
             gradient: [V3::zeros(); 3],
-            corners: [[0.0; 12]; 3],
+            corners: [[0.0; 16]; 3],
             along: [V3::zeros(); 5],
         }
     }
@@ -125,7 +125,23 @@ impl<'a> Shader<'a> {
             );
         }
         let ray = self.camera.unproject(u, v, 1.0).coords;
-        let [nx, ny, nz, open, tu, tv, z, free, along, seam, upper, _] = cache.interpolate(&ray);
+        let [
+            nx,
+            ny,
+            nz,
+            open,
+            tu,
+            tv,
+            z,
+            free,
+            along,
+            seam,
+            upper,
+            _,
+            mx,
+            my,
+            ..,
+        ] = cache.interpolate(&ray);
         let eye = ray * -ray.norm_squared().sqrt().recip();
         let n = V3::new(nx, ny, nz);
         let length = n.norm_squared().sqrt();
@@ -156,7 +172,7 @@ impl<'a> Shader<'a> {
             is_upper: upper > 0.5,
         };
         let uv = [tu, tv].map(|t| t * fabric.metres_per_uv);
-        let relief = cloth.sample(uv, &place, footprint);
+        let relief = cloth.sample(uv, &place, [mx, my], footprint);
         let tilt: V3 = (cache.along.iter().zip(relief.slopes))
             .map(|(g, s)| g * s)
             .sum();

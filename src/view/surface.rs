@@ -46,7 +46,7 @@ impl FaceFlags {
 }
 
 /// Attributes of a vertex.
-pub(crate) type VertexAttributes = [f32; 12];
+pub(crate) type VertexAttributes = [f32; 16];
 
 /// Garments joined, innermost first. Rebuilt for every picture; capacity is kept.
 #[derive(Clone, Debug, Default)]
@@ -54,8 +54,8 @@ pub(crate) struct Surface {
     pub(crate) vertices: Vec<P3>,
     pub(super) normals: Vec<V3>,
     /// Interpolated by shading, shape `[vertices]`: normal, openness (share of ambient light that reaches the vertex),
-    /// texture coordinate, depth, distance from a free edge, length along it, distance from a seam, 1 at an upper edge,
-    /// unused. Valid at corners of visible faces.
+    /// texture coordinate, depth, distance from a free edge, length along it, distance from a seam, 1 at an upper edge, unused,
+    /// compression by its double angle, twice unused. Valid at corners of visible faces.
     pub(crate) attributes: Vec<VertexAttributes>,
     pub(super) uv: Vec<[f32; 2]>,
     pub(super) places: Vec<EdgePlace>,
@@ -92,6 +92,8 @@ pub(super) struct ShadingScratch {
     pub(super) is_visible: Vec<bool>,
     /// Faces with a visible corner.
     pub(super) faces: Vec<u32>,
+    /// Sum of area times compression, by its double angle in the pattern, and of area, shape `[vertices]`.
+    pub(super) compression: Vec<[f32; 3]>,
     /// Sum of the neighbours' elevations, then openness, shape `[vertices]`.
     pub(super) openness: Vec<f32>,
     /// Edges at each vertex, counted from both sides.

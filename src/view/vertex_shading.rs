@@ -15,6 +15,7 @@ impl Surface {
         self.find_visible();
         self.compute_normals();
         self.compute_openness(lights);
+        self.compute_compression();
         self.write_attributes()
     }
 
@@ -82,9 +83,31 @@ impl Surface {
         }
     }
 
+    /// Compression of the simulated mesh against its pattern, of garments of cloth: wrinkles that it is too coarse for.
+    fn compute_compression(&mut self) {
+        let sums = &mut self.scratch.compression;
+        sums.clear();
+        sums.resize(self.vertices.len(), [0.0; 3]);
+        for id in &self.scratch.faces {
+            let fabric = &self.fabrics[usize::from(self.garment[*id as usize])];
+            if fabric.cloth.is_none() {
+                continue;
+            }
+            let f = self.faces[*id as usize].map(|i| i as usize);
+            let flat = f.map(|i| self.uv[i].map(|t| t * fabric.metres_per_uv));
+            let (compression, area) = compression(f.map(|i| self.vertices[i].coords), flat);
+            for i in f {
+                let sum = &mut sums[i];
+                sum[0] += area * compression[0];
+                sum[1] += area * compression[1];
+                sum[2] += area;
+            }
+        }
+    }
+
     fn write_attributes(&mut self) -> usize {
         let mut skipped = 0;
-        self.attributes.resize(self.vertices.len(), [0.0; 12]);
+        self.attributes.resize(self.vertices.len(), [0.0; 16]);
         for (i, out) in self.attributes.iter_mut().enumerate() {
             if !self.scratch.is_visible[i] {
                 skipped += 1;
@@ -96,6 +119,8 @@ impl Surface {
             // Beyond every edge a large number serves as well as infinity, and can be interpolated.
             let [free, seam] = [place.free, place.seam].map(|d| d.min(FAR));
             let upper = f32::from(u8::from(place.is_upper));
+            let [x, y, area] = self.scratch.compression[i];
+            let [x, y] = [x, y].map(|m| m / area.max(f32::MIN_POSITIVE));
             *out = [
                 n.x,
                 n.y,
@@ -109,8 +134,74 @@ impl Surface {
                 seam,
                 upper,
                 0.0,
+                x,
+                y,
+                0.0,
+                0.0,
             ];
         }
         skipped
+    }
+}
+
+/// Greatest compression of a triangle in its plane against its flat shape (metres): ε (cos 2θ, sin 2θ) with the strain ε ≥ 0
+/// along θ in the pattern; and its flat area.
+fn compression([a, b, c]: [V3; 3], flat: [[f32; 2]; 3]) -> ([f32; 2], f32) {
+    let [p, q] = [1, 2].map(|k| [flat[k][0] - flat[0][0], flat[k][1] - flat[0][1]]);
+    let double = p[0] * q[1] - p[1] * q[0];
+    if double == 0.0 {
+        return ([0.0; 2], 0.0);
+    }
+    // Deformation gradient, column by column.
+    let (e, d) = (b - a, c - a);
+    let x = (e * q[1] - d * p[1]) / double;
+    let y = (d * p[0] - e * q[0]) / double;
+    let strain = [
+        0.5 * (x.dot(&x) - 1.0),
+        0.5 * x.dot(&y),
+        0.5 * (y.dot(&y) - 1.0),
+    ];
+    let mean = 0.5 * (strain[0] + strain[2]);
+    let half = 0.5 * (strain[0] - strain[2]);
+    let spread = half.hypot(strain[1]);
+    let least = (spread - mean).max(0.0);
+    let unit = -least / spread.max(f32::MIN_POSITIVE);
+    ([unit * half, unit * strain[1]], 0.5 * double.abs())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A flat triangle shortened by `share` along an angle of its pattern, in a tilted plane.
+    fn shortened(share: f32, angle: f32) -> [f32; 2] {
+        let flat = [[0.0, 0.0], [0.02, 0.003], [0.004, 0.017]];
+        let along = [angle.cos(), angle.sin()];
+        let axes = [V3::new(0.6, 0.0, 0.8), V3::new(0.0, 1.0, 0.0)];
+        let place = |p: [f32; 2]| {
+            let t = p[0] * along[0] + p[1] * along[1];
+            let moved = [p[0] - share * t * along[0], p[1] - share * t * along[1]];
+            axes[0] * moved[0] + axes[1] * moved[1]
+        };
+        compression(flat.map(place), flat).0
+    }
+
+    #[test]
+    fn compression_has_the_strain_and_the_direction_of_shortening() {
+        for angle in [0.0f32, 0.4, 1.2, 2.8] {
+            let [x, y] = shortened(0.05, angle);
+            // Green's strain of a shortening by 5 %.
+            let expected = 0.5 * (1.0 - 0.95 * 0.95);
+            assert!((x.hypot(y) - expected).abs() < 1e-4, "{x} {y}");
+            let off = (0.5 * y.atan2(x) - angle).rem_euclid(std::f32::consts::PI);
+            assert!(off.min(std::f32::consts::PI - off) < 1e-3, "{angle}: {off}");
+        }
+    }
+
+    #[test]
+    fn stretch_and_collapsed_patterns_are_no_compression() {
+        assert_eq!(shortened(-0.05, 0.7), [0.0; 2]);
+        let corners = [V3::zeros(), V3::x(), V3::y()];
+        assert_eq!(compression(corners, [[0.0; 2]; 3]), ([0.0; 2], 0.0));
     }
 }

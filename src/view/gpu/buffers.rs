@@ -75,6 +75,7 @@ pub(super) struct FabricData {
     sizes: [f32; 4],
     look: [f32; 4],
     pucker: [f32; 4],
+    wrinkle: [f32; 4],
 }
 
 impl FabricData {
@@ -105,6 +106,7 @@ impl FabricData {
             sizes: numbers.sizes,
             look: numbers.look,
             pucker: numbers.pucker,
+            wrinkle: numbers.wrinkle,
         }
     }
 }

@@ -34,7 +34,7 @@ struct Fabric {
     pattern: vec4f,
     // First texel, columns, rows and levels of an image.
     image: vec4u,
-    // First relief, levels of yarns and surface, 1 for a cloth.
+    // First relief, levels of yarns, surface and wrinkles; none without a cloth.
     cloth: vec4u,
     // Sides of yarns and surface, pitch, ribs at lower edges, metres.
     sizes: vec4f,
@@ -42,6 +42,8 @@ struct Fabric {
     look: vec4f,
     // Wave and place of puckers at lower and upper edges.
     pucker: vec4f,
+    // Side of the wrinkles, metres.
+    wrinkle: vec4f,
 }
 
 struct Attribute {
@@ -51,6 +53,8 @@ struct Attribute {
     more: vec4f,
     // Length along that edge, distance from a seam, 1 at an upper edge, unused.
     place: vec4f,
+    // Compression by its double angle; unused.
+    compression: vec4f,
 }
 
 @group(0) @binding(0) var<uniform> scene: Scene;
@@ -62,7 +66,7 @@ struct Attribute {
 @group(0) @binding(5) var<storage, read> fabrics: array<Fabric>;
 // sRGB, 0xBBGGRR, level by level, row by row.
 @group(0) @binding(6) var<storage, read> texels: array<u32>;
-// Yarns and surface of each cloth, level by level; profiles of its lower and upper edges, and of its seams.
+// Yarns, surface and wrinkles of each cloth, level by level; profiles of its lower and upper edges, and of its seams.
 @group(0) @binding(7) var<storage, read> reliefs: array<vec4f>;
 @group(1) @binding(0) var faces: texture_2d<u32>;
 @group(1) @binding(1) var depths: texture_depth_2d;
@@ -269,15 +273,19 @@ struct Relief {
 }
 
 const TAU: f32 = 6.2831853;
+const PI: f32 = 3.14159265;
 
 fn spread(t: vec4f) -> f32 {
     return max(t.w - 0.5 * dot(t.xy, t.xy), 0.0);
 }
 
-fn relief_of(f: Fabric, uv: vec2f, free: f32, along: f32, seam: f32, is_upper: bool, footprint: f32) -> Relief {
+fn relief_of(
+    f: Fabric, uv: vec2f, free: f32, along: f32, seam: f32, is_upper: bool, compression: vec2f, footprint: f32,
+) -> Relief {
     let yarns = f.cloth.x;
     let surface = yarns + texels_before(f.cloth.y, f.cloth.y);
-    let edges = surface + texels_before(f.cloth.z, f.cloth.z);
+    let wrinkles = surface + texels_before(f.cloth.z, f.cloth.z);
+    let edges = wrinkles + texels_before(f.cloth.w, f.cloth.w);
     let s = tile_at(surface, f.cloth.z, f.sizes.y, uv, footprint);
     var y = reliefs[surface - 1u];
     if footprint < 2.0 * f.sizes.z {
@@ -287,6 +295,24 @@ fn relief_of(f: Fabric, uv: vec2f, free: f32, along: f32, seam: f32, is_upper: b
     out.slopes = vec4f(s.xy + y.xy, 0.0, 0.0);
     out.tone = 1.0 + s.z + y.z;
     out.variance = spread(s) + spread(y);
+    let strain = length(compression);
+    if strain >= 5e-4 {
+        let steep = sqrt(2.0 * min(strain - 5e-4, 0.08));
+        let turn = fract(0.5 * atan2(compression.y, compression.x) / PI) * 8.0;
+        let first = floor(turn);
+        for (var k = 0; k < 2; k++) {
+            let share = select(1.0 - (turn - first), turn - first, k == 1);
+            let angle = f32((u32(first) + u32(k)) % 8u) * PI / 8.0;
+            let c = cos(angle);
+            let s = sin(angle);
+            let turned = vec2f(uv.x * c + uv.y * s, uv.y * c - uv.x * s);
+            let t = tile_at(wrinkles, f.cloth.w, f.wrinkle.x, turned, footprint);
+            let gain = steep * sqrt(share);
+            out.slopes.x += gain * (t.x * c - t.y * s);
+            out.slopes.y += gain * (t.x * s + t.y * c);
+            out.tone *= 1.0 + 0.12 * gain * t.z;
+        }
+    }
     let reach = PROFILE_REACH + 0.5 * footprint;
     if free < reach {
         let both = profile_mean(edges, free, footprint);
@@ -380,9 +406,10 @@ fn shaded(face: u32, at: vec2f, shadow: f32) -> vec3f {
     let footprint = high.z / (scene.camera.x * facing);
     let color = albedo(f, high.xy, footprint);
     let gain = scene.light.w * select(1.0, scene.light.y, inner) * (1.0 - shadow);
-    if f.cloth.w == 1u {
+    if f.cloth.w > 0u {
         let place = attributes[i.x].place * w.x + attributes[i.y].place * w.y + attributes[i.z].place * w.z;
-        let relief = relief_of(f, high.xy * f.other.w, high.w, place.x, place.y, place.z > 0.5, footprint);
+        let m = attributes[i.x].compression * w.x + attributes[i.y].compression * w.y + attributes[i.z].compression * w.z;
+        let relief = relief_of(f, high.xy * f.other.w, high.w, place.x, place.y, place.z > 0.5, m.xy, footprint);
         let across = cross(b - a, c - a);
         let scale = 1.0 / max(dot(across, across), 1e-38);
         let ga = cross(across, c - b) * scale;

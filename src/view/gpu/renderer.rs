@@ -439,7 +439,7 @@ mod tests {
         let places = edge_places(&scenery.shirt.faces, &scenery.uv, &vertex);
         for name in ["jersey", "fleece", "denim", "silk"] {
             let look = FabricSample::named(name).expect("a preset").look;
-            scenery.appearance.cloth = Some(Arc::new(ShadedCloth::new(look)));
+            scenery.appearance.cloth = Some(Arc::new(ShadedCloth::new(look, 0.026)));
             for output in [None, Some([500, 300]), Some([1200, 900])] {
                 let garments = [GarmentView {
                     places: &places,

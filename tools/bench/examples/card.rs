@@ -3,7 +3,7 @@
 //! `cargo run --release -p tryon-bench --features gpu --example card -- [--software] [--rounds N] [--out DIR]`
 //!
 //! A synthetic user in T-shirt and skirt at three sizes. Prints a Markdown row a size: medians and 99th percentiles in
-//! milliseconds, and the number of pixels that differ.
+//! milliseconds, those of smooth sheets in place of cloth on the processor too, and the number of pixels that differ.
 #![allow(clippy::print_stdout, clippy::unwrap_used, clippy::expect_used)] // a development tool: stop at the first fault
 
 use clap::Parser;
@@ -20,7 +20,7 @@ use tryon::mirror::{CameraGarments, DrawnLook, DrawnSurface, library_appearance}
 use tryon::synth::{Actor, Sequence, Setting};
 use tryon::view::gpu::Renderer;
 use tryon::view::{
-    BodyView, Input, Limbs, Model, RenderError, RenderReport, State, Workspace, render,
+    BodyView, GarmentView, Input, Limbs, Model, RenderError, RenderReport, State, Workspace, render,
 };
 
 const SIZES: [[u32; 2]; 3] = [[640, 480], [1280, 720], [1920, 1080]];
@@ -83,6 +83,14 @@ fn main() {
         appearance: &look.appearance,
     });
     let garments = camera.views(surfaces);
+    let sheets = ["tshirt", "skirt"].map(library_appearance);
+    let flat: Vec<GarmentView<'_>> = (garments.iter().zip(&sheets))
+        .map(|(garment, appearance)| GarmentView {
+            places: &[],
+            appearance,
+            ..*garment
+        })
+        .collect();
     let template = &sequence.actor().template;
     let input = Input {
         frame: &frame,
@@ -96,15 +104,19 @@ fn main() {
         output: None,
     };
     println!(
-        "\n| picture | processor, one thread: p50 / p99 ms | card: p50 / p99 ms | pixels that differ by more than {DIFFERENT} |"
+        "\n| picture | processor: p50 / p99 ms | smooth sheets: p50 / p99 ms | card: p50 / p99 ms | pixels that differ by more than {DIFFERENT} |"
     );
-    println!("|---|---|---|---|");
+    println!("|---|---|---|---|---|");
     for size in SIZES {
         let input = Input {
             output: Some(size),
             ..input
         };
-        compare(&args, &mut card, &input);
+        let flat = Input {
+            garments: &flat,
+            ..input
+        };
+        compare(&args, &mut card, &input, &flat);
     }
 }
 
@@ -121,10 +133,12 @@ fn dressed(sequence: &Sequence, pose: &Pose<World>) -> Dressed {
 }
 
 /// Prints the row of one size and writes its two pictures.
-fn compare(args: &Args, card: &mut Renderer, input: &Input<'_>) {
+fn compare(args: &Args, card: &mut Renderer, input: &Input<'_>, flat: &Input<'_>) {
     let model = Model::default();
     let (mut state, mut work) = (State::default(), Workspace::default());
     let (on_processor, a) = timed(args.rounds, || render(&model, &mut state, input, &mut work));
+    let (mut state, mut work) = (State::default(), Workspace::default());
+    let (_, smooth) = timed(args.rounds, || render(&model, &mut state, flat, &mut work));
     let (mut state, mut work) = (State::default(), Workspace::default());
     let (on_card, b) = timed(args.rounds, || {
         card.render(&model, &mut state, input, &mut work)
@@ -132,7 +146,7 @@ fn compare(args: &Args, card: &mut Renderer, input: &Input<'_>) {
     let (width, height) = (on_card.width(), on_card.height());
     let count = different(&on_processor, &on_card);
     println!(
-        "| {width}×{height} | {a} | {b} | {count} of {} |",
+        "| {width}×{height} | {a} | {smooth} | {b} | {count} of {} |",
         width * height
     );
     if let Some(dir) = &args.out {
