@@ -3,11 +3,13 @@
 use super::cloth_tile::{ClothTexel, ClothTile};
 use super::construction::EdgePlace;
 use super::edge_profile::EdgeProfile;
-use std::f32::consts::PI;
+use std::f32::consts::FRAC_1_SQRT_2;
 use tryon_garment::FabricLook;
 
 /// Footprint of a pixel in pitches from which yarns are roughness alone.
 const YARNS_SEEN: f32 = 2.0;
+/// Footprint from which the uneven surface is roughness alone, metres: its longest wave.
+const SURFACE_SEEN: f32 = 6e-3;
 /// Distance of two ribs, metres, their slope at its steepest, and the light lost between them.
 const RIB: f32 = 2.6e-3;
 const RIB_SLOPE: f32 = 0.9;
@@ -17,12 +19,15 @@ const PUCKER: f32 = 0.09;
 
 /// Length of jersey's wrinkles, metres.
 const WAVE: f32 = 0.026;
-/// Compression below which no wrinkle is seen, and above which none gets steeper.
-const COMPRESSED: [f32; 2] = [5e-4, 0.08];
-/// Share of a compression that wrinkles take up.
-const TAKEN_UP: f32 = 1.0;
-/// Directions for which the tile of wrinkles is turned.
-const TURNS: f32 = 8.0;
+/// Cosine and sine of the directions across which the ridges of each field run.
+const ACROSS: [[f32; 2]; 4] = [
+    [1.0, 0.0],
+    [FRAC_1_SQRT_2, FRAC_1_SQRT_2],
+    [0.0, 1.0],
+    [-FRAC_1_SQRT_2, FRAC_1_SQRT_2],
+];
+/// Slope below which ridges are not seen.
+const LEAST_RIDGE: f32 = 8e-3;
 /// Light lost in valleys of wrinkles, per slope.
 const WRINKLE_SHADE: f32 = 0.12;
 
@@ -82,10 +87,14 @@ impl ShadedCloth {
         &self,
         uv: [f32; 2],
         place: &EdgePlace,
-        compression: [f32; 2],
+        ridges: [f32; 4],
         footprint: f32,
     ) -> ClothSample {
-        let surface = self.surface.sample(uv, footprint);
+        let surface = if footprint < SURFACE_SEEN {
+            self.surface.nearest_level(uv, footprint)
+        } else {
+            self.surface.mean()
+        };
         let yarns = if footprint < YARNS_SEEN * self.look.pitch {
             self.yarns.sample(uv, footprint)
         } else {
@@ -97,7 +106,7 @@ impl ShadedCloth {
             tone: 1.0 + surface[2] + yarns[2],
             variance: variance(&surface) + variance(&yarns),
         };
-        self.wrinkle(uv, compression, footprint, &mut out);
+        self.wrinkle(uv, ridges, footprint, &mut out);
         let reach = EdgeProfile::REACH + 0.5 * footprint;
         if place.free < reach {
             let profile = if place.is_upper {
@@ -124,26 +133,15 @@ impl ShadedCloth {
 }
 
 impl ShadedCloth {
-    /// Adds wrinkles across the direction of compression, ε (cos 2θ, sin 2θ). A sine of wavelength λ and amplitude a takes up
-    /// ε = (π a/λ)², so that its slopes have a root mean square of √(2 ε). Between the directions for which the tile is
-    /// turned, the two nearest are mixed: it moves with the pattern, never with the direction.
-    fn wrinkle(&self, uv: [f32; 2], [x, y]: [f32; 2], footprint: f32, out: &mut ClothSample) {
-        let strain = x.hypot(y);
-        if strain < COMPRESSED[0] {
-            return;
-        }
-        let strain = (strain - COMPRESSED[0]).min(COMPRESSED[1]) * TAKEN_UP;
-        let steep = (2.0 * strain).sqrt();
-        let turn = (0.5 * y.atan2(x) * TURNS / PI).rem_euclid(TURNS);
-        let first = turn.floor();
-        let part = turn - first;
-        // Independent fields: their squares add up.
-        for (k, share) in [(first, (1.0 - part).sqrt()), (first + 1.0, part.sqrt())] {
-            // Half a turn is none.
-            let (s, c) = (k % TURNS * PI / TURNS).sin_cos();
+    /// Adds wrinkles of these slopes across each of [`ACROSS`].
+    #[inline]
+    fn wrinkle(&self, uv: [f32; 2], ridges: [f32; 4], footprint: f32, out: &mut ClothSample) {
+        for (gain, [c, s]) in ridges.into_iter().zip(ACROSS) {
+            if gain < LEAST_RIDGE {
+                continue;
+            }
             let turned = [uv[0] * c + uv[1] * s, uv[1] * c - uv[0] * s];
-            let t = self.wrinkles.sample(turned, footprint);
-            let gain = steep * share;
+            let t = self.wrinkles.nearest_level(turned, footprint);
             out.slopes[0] += gain * (t[0] * c - t[1] * s);
             out.slopes[1] += gain * (t[0] * s + t[1] * c);
             out.tone *= 1.0 + WRINKLE_SHADE * gain * t[2];

@@ -33,6 +33,8 @@ const VALLEY: f32 = 0.9;
 pub(crate) struct ClothTile {
     /// Side, metres.
     side: f32,
+    /// Texels of the finest level in a metre.
+    per_metre: f32,
     /// Finest first, each half as wide as the one before, shape `[side · side]`.
     levels: Vec<Vec<ClothTexel>>,
 }
@@ -124,14 +126,18 @@ impl ClothTile {
             levels.push(next);
             n = half;
         }
-        Self { side, levels }
+        let per_metre = levels[0].len().isqrt() as f32 / side;
+        Self {
+            side,
+            per_metre,
+            levels,
+        }
     }
 
     /// Mean over about `footprint` metres at a place of the pattern (metres), between two levels.
     #[inline]
     pub(crate) fn sample(&self, uv: [f32; 2], footprint: f32) -> ClothTexel {
-        let finest = self.side / (1 << (self.levels.len() - 1)) as f32;
-        let level = (footprint / finest).max(1.0).log2();
+        let level = self.level(footprint);
         let last = self.levels.len() - 1;
         let low = (level as usize).min(last);
         if low == last {
@@ -157,6 +163,20 @@ impl ClothTile {
         self.levels.iter().flatten()
     }
 
+    /// Level whose texels are as wide as `footprint` metres, about: the binary logarithm with a straight mantissa.
+    #[inline]
+    fn level(&self, footprint: f32) -> f32 {
+        let texels = (footprint * self.per_metre).max(1.0).to_bits();
+        (texels >> 23) as f32 - 127.0 + (texels & 0x7f_ffff) as f32 / 8_388_608.0
+    }
+
+    /// As [`Self::sample`], of the nearest level: for waves of many texels, which two levels show alike, and for low relief.
+    #[inline]
+    pub(crate) fn nearest_level(&self, uv: [f32; 2], footprint: f32) -> ClothTexel {
+        let level = self.level(footprint) + 0.5;
+        self.bilinear((level as usize).min(self.levels.len() - 1), uv)
+    }
+
     /// Mean of the whole tile.
     pub(crate) fn mean(&self) -> ClothTexel {
         self.levels[self.levels.len() - 1][0]
@@ -165,11 +185,13 @@ impl ClothTile {
     #[inline]
     fn bilinear(&self, level: usize, uv: [f32; 2]) -> ClothTexel {
         let n = 1usize << (self.levels.len() - 1 - level);
-        let [x, y] = uv.map(|c| c / self.side * n as f32 - 0.5);
-        let (fx, fy) = (x.floor(), y.floor());
-        let (tx, ty) = (x - fx, y - fy);
-        let wrap = |c: f32| (c as i32 as usize) & (n - 1);
-        let (x0, y0) = (wrap(fx), wrap(fy));
+        let scale = self.per_metre / (1usize << level) as f32;
+        let [(x0, tx), (y0, ty)] = uv.map(|c| {
+            let at = c * scale - 0.5;
+            // Rounds down; `floor` is a call where the processor's newer instructions aren't asked for.
+            let low = at as i32 - i32::from(at < 0.0);
+            (low as usize & (n - 1), at - low as f32)
+        });
         let (x1, y1) = ((x0 + 1) & (n - 1), (y0 + 1) & (n - 1));
         let texels = &self.levels[level];
         let [a, b, c, d] =

@@ -138,9 +138,7 @@ impl<'a> Shader<'a> {
             seam,
             upper,
             _,
-            mx,
-            my,
-            ..,
+            ridges @ ..,
         ] = cache.interpolate(&ray);
         let eye = ray * -ray.norm_squared().sqrt().recip();
         let n = V3::new(nx, ny, nz);
@@ -172,7 +170,7 @@ impl<'a> Shader<'a> {
             is_upper: upper > 0.5,
         };
         let uv = [tu, tv].map(|t| t * fabric.metres_per_uv);
-        let relief = cloth.sample(uv, &place, [mx, my], footprint);
+        let relief = cloth.sample(uv, &place, ridges, footprint);
         let tilt: V3 = (cache.along.iter().zip(relief.slopes))
             .map(|(g, s)| g * s)
             .sum();

@@ -55,7 +55,7 @@ pub(crate) struct Surface {
     pub(super) normals: Vec<V3>,
     /// Interpolated by shading, shape `[vertices]`: normal, openness (share of ambient light that reaches the vertex),
     /// texture coordinate, depth, distance from a free edge, length along it, distance from a seam, 1 at an upper edge, unused,
-    /// compression by its double angle, twice unused. Valid at corners of visible faces.
+    /// slopes of the four fields of ridges. Valid at corners of visible faces.
     pub(crate) attributes: Vec<VertexAttributes>,
     pub(super) uv: Vec<[f32; 2]>,
     pub(super) places: Vec<EdgePlace>,

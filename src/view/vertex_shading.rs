@@ -120,32 +120,34 @@ impl Surface {
             let [free, seam] = [place.free, place.seam].map(|d| d.min(FAR));
             let upper = f32::from(u8::from(place.is_upper));
             let [x, y, area] = self.scratch.compression[i];
-            let [x, y] = [x, y].map(|m| m / area.max(f32::MIN_POSITIVE));
-            *out = [
-                n.x,
-                n.y,
-                n.z,
-                open,
-                u,
-                v,
-                z,
-                free,
-                place.along,
-                seam,
-                upper,
-                0.0,
-                x,
-                y,
-                0.0,
-                0.0,
-            ];
+            let ridges = ridges([x, y].map(|m| m / area.max(f32::MIN_POSITIVE)));
+            *out = [0.0; 16];
+            out[..4].copy_from_slice(&[n.x, n.y, n.z, open]);
+            out[4..8].copy_from_slice(&[u, v, z, free]);
+            out[8..11].copy_from_slice(&[place.along, seam, upper]);
+            out[12..].copy_from_slice(&ridges);
         }
         skipped
     }
 }
 
-/// Greatest compression of a triangle in its plane against its flat shape (metres): ε (cos 2θ, sin 2θ) with the strain ε ≥ 0
-/// along θ in the pattern; and its flat area.
+/// Compression below which no wrinkle is seen, and beyond which none gets steeper.
+const COMPRESSED: [f32; 2] = [5e-4, 0.08];
+
+/// Slopes (root mean square) of the four fields of ridges, across the directions 0, 45, 90 and 135° of the pattern, from a
+/// compression ε (cos 2θ, sin 2θ). A sine of wavelength λ and amplitude a takes up ε = (π a/λ)², so that its slopes have
+/// √(2 ε); the two fields beside θ share it, and as they are independent their squares add up to it.
+fn ridges([x, y]: [f32; 2]) -> [f32; 4] {
+    let strain = x.hypot(y);
+    if strain < COMPRESSED[0] {
+        return [0.0; 4];
+    }
+    let steep = (2.0 * (strain - COMPRESSED[0]).min(COMPRESSED[1])).sqrt();
+    [x, y, -x, -y].map(|m| steep * (m / strain).max(0.0))
+}
+
+/// Greatest compression of a triangle in its plane against its flat shape (metres), less the stretch across it:
+/// ε (cos 2θ, sin 2θ) with the strain ε ≥ 0 along θ in the pattern; and its flat area.
 fn compression([a, b, c]: [V3; 3], flat: [[f32; 2]; 3]) -> ([f32; 2], f32) {
     let [p, q] = [1, 2].map(|k| [flat[k][0] - flat[0][0], flat[k][1] - flat[0][1]]);
     let double = p[0] * q[1] - p[1] * q[0];
@@ -164,8 +166,10 @@ fn compression([a, b, c]: [V3; 3], flat: [[f32; 2]; 3]) -> ([f32; 2], f32) {
     let mean = 0.5 * (strain[0] + strain[2]);
     let half = 0.5 * (strain[0] - strain[2]);
     let spread = half.hypot(strain[1]);
-    let least = (spread - mean).max(0.0);
-    let unit = -least / spread.max(f32::MIN_POSITIVE);
+    // Yarns that turn against each other shorten one diagonal as they lengthen the other: no wrinkle takes that up.
+    let sheared = (mean + spread).max(0.0);
+    let wrinkled = (spread - mean - sheared).max(0.0);
+    let unit = -wrinkled / spread.max(f32::MIN_POSITIVE);
     ([unit * half, unit * strain[1]], 0.5 * double.abs())
 }
 
@@ -196,6 +200,30 @@ mod tests {
             let off = (0.5 * y.atan2(x) - angle).rem_euclid(std::f32::consts::PI);
             assert!(off.min(std::f32::consts::PI - off) < 1e-3, "{angle}: {off}");
         }
+    }
+
+    #[test]
+    fn ridges_share_the_slope_of_a_compression() {
+        for angle in [0.0f32, 0.3, 1.0, 2.5] {
+            let (s, c) = (2.0 * angle).sin_cos();
+            let slopes = ridges([0.0205 * c, 0.0205 * s]);
+            let sum = slopes.iter().map(|s| s * s).sum::<f32>().sqrt();
+            assert!((sum - 0.2).abs() < 1e-3, "{slopes:?}");
+            assert!(slopes.iter().filter(|s| **s > 1e-6).count() <= 2);
+        }
+        assert_eq!(ridges([3e-4, 0.0]), [0.0; 4]);
+    }
+
+    #[test]
+    fn shear_of_the_yarns_is_no_compression() {
+        let flat = [[0.0, 0.0], [0.02, 0.0], [0.0, 0.02]];
+        let sheared = [
+            V3::zeros(),
+            V3::new(0.02, 0.0, 0.0),
+            V3::new(0.003, 0.02, 0.0),
+        ];
+        let [x, y] = compression(sheared, flat).0;
+        assert!(x.hypot(y) < 1e-3, "{x} {y}");
     }
 
     #[test]

@@ -53,8 +53,8 @@ struct Attribute {
     more: vec4f,
     // Length along that edge, distance from a seam, 1 at an upper edge, unused.
     place: vec4f,
-    // Compression by its double angle; unused.
-    compression: vec4f,
+    // Slopes of the four fields of ridges.
+    ridges: vec4f,
 }
 
 @group(0) @binding(0) var<uniform> scene: Scene;
@@ -234,9 +234,15 @@ fn tile_level(first: u32, levels: u32, side: f32, level: u32, uv: vec2f) -> vec4
     return mix(top, bottom, w.y);
 }
 
+// Binary logarithm with a straight mantissa, from 0 on.
+fn level_of(texels: f32) -> f32 {
+    let b = bitcast<u32>(max(texels, 1.0));
+    return f32(b >> 23u) - 127.0 + f32(b & 0x7fffffu) / 8388608.0;
+}
+
 fn tile_at(first: u32, levels: u32, side: f32, uv: vec2f, footprint: f32) -> vec4f {
     let finest = side / f32(1u << (levels - 1u));
-    let level = log2(max(footprint / finest, 1.0));
+    let level = level_of(footprint / finest);
     let low = min(u32(level), levels - 1u);
     if low == levels - 1u {
         return reliefs[first + texels_before(levels, low)];
@@ -244,6 +250,12 @@ fn tile_at(first: u32, levels: u32, side: f32, uv: vec2f, footprint: f32) -> vec
     let a = tile_level(first, levels, side, low, uv);
     let b = tile_level(first, levels, side, low + 1u, uv);
     return mix(a, b, level - f32(low));
+}
+
+fn tile_nearest(first: u32, levels: u32, side: f32, uv: vec2f, footprint: f32) -> vec4f {
+    let finest = side / f32(1u << (levels - 1u));
+    let level = min(u32(level_of(footprint / finest) + 0.5), levels - 1u);
+    return tile_level(first, levels, side, level, uv);
 }
 
 const PROFILE: u32 = 257u;
@@ -273,20 +285,22 @@ struct Relief {
 }
 
 const TAU: f32 = 6.2831853;
-const PI: f32 = 3.14159265;
 
 fn spread(t: vec4f) -> f32 {
     return max(t.w - 0.5 * dot(t.xy, t.xy), 0.0);
 }
 
 fn relief_of(
-    f: Fabric, uv: vec2f, free: f32, along: f32, seam: f32, is_upper: bool, compression: vec2f, footprint: f32,
+    f: Fabric, uv: vec2f, free: f32, along: f32, seam: f32, is_upper: bool, ridges: vec4f, footprint: f32,
 ) -> Relief {
     let yarns = f.cloth.x;
     let surface = yarns + texels_before(f.cloth.y, f.cloth.y);
     let wrinkles = surface + texels_before(f.cloth.z, f.cloth.z);
     let edges = wrinkles + texels_before(f.cloth.w, f.cloth.w);
-    let s = tile_at(surface, f.cloth.z, f.sizes.y, uv, footprint);
+    var s = reliefs[wrinkles - 1u];
+    if footprint < 6e-3 {
+        s = tile_nearest(surface, f.cloth.z, f.sizes.y, uv, footprint);
+    }
     var y = reliefs[surface - 1u];
     if footprint < 2.0 * f.sizes.z {
         y = tile_at(yarns, f.cloth.y, f.sizes.x, uv, footprint);
@@ -295,23 +309,18 @@ fn relief_of(
     out.slopes = vec4f(s.xy + y.xy, 0.0, 0.0);
     out.tone = 1.0 + s.z + y.z;
     out.variance = spread(s) + spread(y);
-    let strain = length(compression);
-    if strain >= 5e-4 {
-        let steep = sqrt(2.0 * min(strain - 5e-4, 0.08));
-        let turn = fract(0.5 * atan2(compression.y, compression.x) / PI) * 8.0;
-        let first = floor(turn);
-        for (var k = 0; k < 2; k++) {
-            let share = select(1.0 - (turn - first), turn - first, k == 1);
-            let angle = f32((u32(first) + u32(k)) % 8u) * PI / 8.0;
-            let c = cos(angle);
-            let s = sin(angle);
-            let turned = vec2f(uv.x * c + uv.y * s, uv.y * c - uv.x * s);
-            let t = tile_at(wrinkles, f.cloth.w, f.wrinkle.x, turned, footprint);
-            let gain = steep * sqrt(share);
-            out.slopes.x += gain * (t.x * c - t.y * s);
-            out.slopes.y += gain * (t.x * s + t.y * c);
-            out.tone *= 1.0 + 0.12 * gain * t.z;
+    for (var k = 0u; k < 4u; k++) {
+        let gain = ridges[k];
+        if gain < 8e-3 {
+            continue;
         }
+        let c = vec4f(1.0, 0.70710678, 0.0, -0.70710678)[k];
+        let s = vec4f(0.0, 0.70710678, 1.0, 0.70710678)[k];
+        let turned = vec2f(uv.x * c + uv.y * s, uv.y * c - uv.x * s);
+        let t = tile_nearest(wrinkles, f.cloth.w, f.wrinkle.x, turned, footprint);
+        out.slopes.x += gain * (t.x * c - t.y * s);
+        out.slopes.y += gain * (t.x * s + t.y * c);
+        out.tone *= 1.0 + 0.12 * gain * t.z;
     }
     let reach = PROFILE_REACH + 0.5 * footprint;
     if free < reach {
@@ -408,8 +417,8 @@ fn shaded(face: u32, at: vec2f, shadow: f32) -> vec3f {
     let gain = scene.light.w * select(1.0, scene.light.y, inner) * (1.0 - shadow);
     if f.cloth.w > 0u {
         let place = attributes[i.x].place * w.x + attributes[i.y].place * w.y + attributes[i.z].place * w.z;
-        let m = attributes[i.x].compression * w.x + attributes[i.y].compression * w.y + attributes[i.z].compression * w.z;
-        let relief = relief_of(f, high.xy * f.other.w, high.w, place.x, place.y, place.z > 0.5, m.xy, footprint);
+        let m = attributes[i.x].ridges * w.x + attributes[i.y].ridges * w.y + attributes[i.z].ridges * w.z;
+        let relief = relief_of(f, high.xy * f.other.w, high.w, place.x, place.y, place.z > 0.5, m, footprint);
         let across = cross(b - a, c - a);
         let scale = 1.0 / max(dot(across, across), 1e-38);
         let ga = cross(across, c - b) * scale;
