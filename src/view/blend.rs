@@ -3,6 +3,7 @@
 use super::area::Area;
 use super::captured_depth::AreaDepth;
 use super::coverage::PixelCoverage;
+use super::grain::Grain;
 use super::shading::{ShadedFace, Shader};
 use super::workspace::Workspace;
 use tryon_geometry::camera::ColorImage;
@@ -20,6 +21,8 @@ pub(super) struct Blender<'a> {
     /// Samples along each side of a pixel.
     pub(super) samples: usize,
     pub(super) depth: &'a AreaDepth,
+    /// Grain on garments.
+    pub(super) grain: Grain,
 }
 
 impl Blender<'_> {
@@ -63,6 +66,9 @@ impl Blender<'_> {
         let mut color = [0.0; 3];
         if cover > 0.0 {
             color = self.garment_color(cache, p, [x, y], lights.contact * around.front);
+            let [u, v] = [self.area.left + x as u32, self.area.top + y as u32];
+            let grain = self.grain.at(u, v);
+            color = color.map(|c| (c + grain).clamp(0.0, 255.0));
         }
         for c in 0..3 {
             out[c] = (behind[c] + (color[c] - behind[c]) * cover + 0.5) as u8;

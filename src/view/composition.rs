@@ -3,16 +3,17 @@
 use super::area::Area;
 use super::captured::{brightness, captured};
 use super::captured_depth::AreaDepth;
-use super::config::Model;
+use super::config::{Config, Model};
 use super::coverage::remove_biases;
 use super::evidence::{Evidence, PixelDepths};
+use super::grain;
 use super::hand::{ArmScene, CapturedPixels, LayerDepths, PosedLimbs};
 use super::input::{Input, RenderError};
 use super::matte::MatteInput;
 use super::off_person::{OffPerson, OffPersonInput};
 use super::report::{HandReport, RenderReport};
 use super::room_light::{LitScene, RoomLight};
-use super::settings::{BareArmSettings, OffPersonSettings, RoomLightSettings};
+use super::settings::{BareArmSettings, OffPersonSettings};
 use super::silhouette_grid::DressedArea;
 use super::state::State;
 use super::viewport::Viewport;
@@ -89,7 +90,7 @@ impl<'a> Composition<'a> {
         self.clock = Instant::now();
     }
 
-    /// Draws the tracked body into `work.body`, and measures the light of the room on it if that is due. Before all that
+    /// Draws the tracked body into `work.body`, and measures light of the room and grain if that is due. Before all that
     /// depends on either.
     pub(crate) fn see_body(
         &mut self,
@@ -102,7 +103,7 @@ impl<'a> Composition<'a> {
         let config = &model.config;
         self.is_tracked = (work.body).rasterise(config.par, input, &self.viewport, area);
         if self.is_tracked {
-            self.measure_light(&config.room_light, state, input, work);
+            self.measure_room(config, state, input, work);
         }
         self.lap("body");
     }
@@ -152,10 +153,10 @@ impl<'a> Composition<'a> {
         depth
     }
 
-    /// Measures the light of the room, if that is due.
-    fn measure_light(
+    /// Measures the light of the room and the camera's grain, if that is due.
+    fn measure_room(
         &self,
-        settings: &RoomLightSettings,
+        config: &Config,
         state: &mut State,
         input: &Input<'_>,
         work: &Workspace,
@@ -163,8 +164,8 @@ impl<'a> Composition<'a> {
         let (Some(body), Some(_)) = (input.body, &input.frame.color) else {
             return;
         };
-        let time_ns = input.frame.time_ns;
-        if !state.is_light_due(settings.interval, time_ns) {
+        let (settings, time_ns) = (&config.room_light, input.frame.time_ns);
+        if !state.is_room_due(settings.interval, time_ns) {
             return;
         }
         let scene = LitScene {
@@ -173,9 +174,10 @@ impl<'a> Composition<'a> {
             depth: self.depth.data(),
         };
         let vertices = work.body.vertices(input, &body);
-        if let Some(light) = RoomLight::measure(&scene, &body, vertices, settings) {
-            state.take_light(light, time_ns, settings);
-        }
+        let light = RoomLight::measure(&scene, &body, vertices, settings);
+        let has_reading = |u, v| scene.depth_at(u, v).is_some_and(|z| z > 0.0);
+        let grain = grain::measure(&self.image, has_reading, &config.grain);
+        state.take_room(light, grain, time_ns, settings);
     }
 
     /// Measures the garments off the person in the picture.

@@ -1,7 +1,8 @@
 //! Settings of the compositor; immutable while a session runs.
 
 use super::settings::{
-    BareArmSettings, ExposureSettings, MatteSettings, OffPersonSettings, RoomLightSettings,
+    BareArmSettings, ExposureSettings, GrainSettings, MatteSettings, OffPersonSettings,
+    RoomLightSettings,
 };
 use super::srgb::ToSrgb;
 use serde::{Deserialize, Serialize};
@@ -103,6 +104,8 @@ pub struct Config {
     pub exposure: ExposureSettings,
     /// Light of the room.
     pub room_light: RoomLightSettings,
+    /// Grain of the camera.
+    pub grain: GrainSettings,
     /// Matte of the captured scene.
     pub matte: MatteSettings,
     /// Bare hands and forearms.
@@ -133,6 +136,7 @@ impl Default for Config {
             off_person_interval: 0.2,
             exposure: ExposureSettings::default(),
             room_light: RoomLightSettings::default(),
+            grain: GrainSettings::default(),
             matte: MatteSettings::default(),
             bare_arms: BareArmSettings::default(),
             off_person: OffPersonSettings::default(),

@@ -52,7 +52,7 @@
 //! - Garments beside the recorded person: [`mod@off_person`], [`mod@silhouette_grid`].
 //! - Bare hands by colour: [`mod@hand::detect`].
 //! - Light: [`mod@shading`], [`mod@contact_shadow`].
-//! - Light of the room, from the captured person: [`mod@room_light`].
+//! - Light of the room, from the captured person: [`mod@room_light`]. Grain of the camera: [`mod@grain`].
 //! - Fabric colour and prints: [`mod@appearance`]. Yarns and surface: [`mod@cloth_tile`]; both: [`mod@cloth`].
 //! - Seams, hems, ribs: [`mod@construction`], [`mod@edge_profile`].
 //! - Images on fabric: [`mod@image_pyramid`].
@@ -78,6 +78,7 @@ mod edge_profile;
 mod evidence;
 #[cfg(feature = "gpu")]
 pub mod gpu;
+mod grain;
 mod hand;
 mod image_pyramid;
 mod input;
@@ -113,8 +114,8 @@ pub use render::render;
 pub use report::{HandReport, RenderReport};
 pub use room_light::RoomLight;
 pub use settings::{
-    BareArmSettings, ExposureSettings, LimbSettings, MatteSettings, OffPersonSettings,
-    RoomLightSettings, SkinSettings,
+    BareArmSettings, ExposureSettings, GrainSettings, LimbSettings, MatteSettings,
+    OffPersonSettings, RoomLightSettings, SkinSettings,
 };
 pub use state::State;
 pub use workspace::Workspace;

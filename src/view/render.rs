@@ -44,13 +44,14 @@ pub fn render(
             picture.viewport.camera,
             &model.to_srgb,
             &config.lights,
-            state.room_light.as_ref().map(|(light, _)| light),
+            state.room_light.as_ref(),
             picture.report.brightness,
         ),
         work,
         area: &area,
         samples: n as usize,
         depth: &depth,
+        grain: state.grain_of(input.frame.sequence),
     };
     blender.blend(config.par, &mut picture.image);
     picture.lap("shading");

@@ -44,9 +44,14 @@ impl LitScene<'_> {
             return None;
         }
         let (u, v) = (u as u32, v as u32);
+        Some((self.image.at(u, v), self.depth_at(u, v)?))
+    }
+
+    /// Depth at a pixel of the picture, metres, 0 = no reading; `None` beside the depth image.
+    pub(crate) fn depth_at(&self, u: u32, v: u32) -> Option<f32> {
         let [x, y] = [self.viewport.depth_at(0, u)?, self.viewport.depth_at(1, v)?];
         let mm = self.depth[(y * self.viewport.depth[0] + x) as usize];
-        Some((self.image.at(u, v), f32::from(mm) * 1e-3))
+        Some(f32::from(mm) * 1e-3)
     }
 }
 
@@ -85,13 +90,20 @@ impl RoomLight {
 
     /// This light after `seconds` of another.
     pub(crate) fn toward(&self, other: &Self, seconds: f32, settings: &RoomLightSettings) -> Self {
-        let share = 1.0 - (-seconds.max(0.0) / settings.memory).exp();
+        let share = settings.share(seconds);
         Self {
             slope: [0, 1, 2].map(|c| {
                 let (a, b) = (self.slope[c], other.slope[c]);
                 [0, 1, 2].map(|k| a[k] + (b[k] - a[k]) * share)
             }),
         }
+    }
+}
+
+impl RoomLightSettings {
+    /// Share of something new after a time, seconds.
+    pub(crate) fn share(&self, seconds: f32) -> f32 {
+        1.0 - (-seconds.max(0.0) / self.memory).exp()
     }
 }
 

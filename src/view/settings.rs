@@ -43,6 +43,18 @@ settings! {
         pub least_light: f32 = 0.05,
     }
 
+    /// Settings of the camera's grain.
+    pub struct GrainSettings {
+        /// Columns and rows between two looked at.
+        pub step: usize = 5,
+        /// Fewest pixels of which a grain is told.
+        pub least: usize = 200,
+        /// Brightness of a usable pixel: below and above it noise is cut off.
+        pub exposed: [u8; 2] = [16, 240],
+        /// Greatest grain given to garments, grey levels: two pictures of 2 differ by more than 8 in one pixel of 200.
+        pub most: f32 = 2.0,
+    }
+
     /// Settings of the matte of the captured scene over the garments.
     pub struct MatteSettings {
         /// Distance from a patch's edge at which depths are compared, depth pixels: flying pixels lie in between.

@@ -1,5 +1,6 @@
 //! Memory between pictures: colours of one user's skin and clothes, time of the last measurement.
 
+use super::grain::Grain;
 use super::room_light::RoomLight;
 use super::settings::{RoomLightSettings, SkinSettings};
 use super::skin::{MIN_TONES, SkinClassifier, tone};
@@ -17,9 +18,15 @@ pub struct State {
     /// Capture time of the last measurement of garments off the person, nanoseconds; `None` = never.
     #[serde(default)]
     off_person_ns: Option<u64>,
-    /// Light of the room and the capture time of its last measurement, nanoseconds.
+    /// Light of the room.
     #[serde(default)]
-    pub(super) room_light: Option<(RoomLight, u64)>,
+    pub(super) room_light: Option<RoomLight>,
+    /// Grain of the camera, grey levels.
+    #[serde(default)]
+    grain: f32,
+    /// Capture time of the last measurement of both, nanoseconds; `None` = never.
+    #[serde(default)]
+    room_ns: Option<u64>,
 }
 
 /// Region of the body a colour was taken from.
@@ -43,6 +50,8 @@ impl State {
             *self = Self {
                 off_person_ns: self.off_person_ns,
                 room_light: self.room_light,
+                grain: self.grain,
+                room_ns: self.room_ns,
                 ..Self::default()
             };
         }
@@ -58,26 +67,38 @@ impl State {
         is_due
     }
 
-    /// True when the light of the room is to be measured in the picture of `time_ns`: `interval` seconds after the last time.
-    pub(super) fn is_light_due(&self, interval: f64, time_ns: u64) -> bool {
-        is_due(self.room_light.map(|(_, last)| last), interval, time_ns)
+    /// True when light of the room and grain are to be measured in the picture of `time_ns`: `interval` seconds after the last
+    /// time.
+    pub(super) fn is_room_due(&self, interval: f64, time_ns: u64) -> bool {
+        is_due(self.room_ns, interval, time_ns)
     }
 
-    /// Takes a measured light of the room.
-    pub(super) fn take_light(
+    /// Grain of a picture by the number of its exposure.
+    pub(super) fn grain_of(&self, sequence: u64) -> Grain {
+        Grain {
+            sigma: self.grain,
+            picture: sequence as u32,
+        }
+    }
+
+    /// Takes a measured light of the room and a grain, each where there is one.
+    pub(super) fn take_room(
         &mut self,
-        new: RoomLight,
+        light: Option<RoomLight>,
+        grain: Option<f32>,
         time_ns: u64,
         settings: &RoomLightSettings,
     ) {
-        let light = match self.room_light {
-            Some((old, last)) => {
-                let passed = time_ns.saturating_sub(last) as f64 * 1e-9;
-                old.toward(&new, passed as f32, settings)
-            }
-            None => new,
-        };
-        self.room_light = Some((light, time_ns));
+        let passed = self.room_ns.map(|last| time_ns.saturating_sub(last));
+        let passed = passed.map_or(f32::INFINITY, |ns| (ns as f64 * 1e-9) as f32);
+        if let Some(new) = light {
+            let old = self.room_light.unwrap_or(new);
+            self.room_light = Some(old.toward(&new, passed, settings));
+        }
+        if let Some(new) = grain {
+            self.grain += (new - self.grain) * settings.share(passed);
+        }
+        self.room_ns = Some(time_ns);
     }
 
     /// Slot and vertex of the `vertices` to sample in this picture.

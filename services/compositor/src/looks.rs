@@ -17,8 +17,11 @@ impl Looks {
     pub(crate) fn keep(&mut self, job: &Job) {
         let worn = job.placed.iter().flat_map(|p| &p.garments);
         let worn: Vec<_> = worn.map(|(garment, _)| garment).collect();
-        self.0
-            .retain(|(own, _)| worn.iter().any(|w| is_same(own, w)));
+        self.keep_garments(&worn);
+    }
+
+    fn keep_garments(&mut self, worn: &[&Arc<WornGarment>]) {
+        (self.0).retain(|(own, _)| worn.iter().any(|w| is_same(own, w)));
     }
 
     pub(crate) fn of(&mut self, garment: &Arc<WornGarment>) -> Arc<DrawnLook> {
@@ -74,4 +77,57 @@ fn drawn_look(garment: &WornGarment) -> DrawnLook {
         faces: garment.faces.clone(),
     };
     DrawnLook::of(&mesh, &look.fabric, appearance)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use tryon_proto::v1::GarmentLook;
+
+    /// Two triangles of one panel.
+    fn garment(fabric: &str) -> Arc<WornGarment> {
+        Arc::new(WornGarment {
+            garment: "square".into(),
+            size: String::new(),
+            vertices: 4,
+            drawn: vec![0, 1, 2, 3],
+            faces: vec![[0, 1, 2], [0, 2, 3]],
+            uvs: vec![[0.0, 0.0], [0.2, 0.0], [0.2, 0.2], [0.0, 0.2]],
+            look: GarmentLook {
+                color_rgb: 0x0020_4060,
+                fabric: fabric.into(),
+                ..GarmentLook::default()
+            },
+            image: None,
+        })
+    }
+
+    #[test]
+    fn a_garment_is_drawn_in_the_fabric_that_the_stream_names() {
+        let mut looks = Looks::default();
+        let [denim, silk, unknown] = ["denim", "silk", "mithril"].map(|f| looks.of(&garment(f)));
+        assert_ne!(denim.appearance.cloth, silk.appearance.cloth);
+        assert_eq!(unknown.appearance.cloth, Some(Arc::default()), "jersey");
+        assert_eq!(
+            (denim.appearance.base, denim.places.len()),
+            ([0x20, 0x40, 0x60], 4)
+        );
+        assert!(
+            denim.places.iter().all(|p| p.free == 0.0),
+            "no edge is sewn"
+        );
+    }
+
+    #[test]
+    fn looks_are_prepared_once_and_dropped_with_their_garments() {
+        let mut looks = Looks::default();
+        let first = looks.of(&garment("denim"));
+        // A stream that begins anew sends the same garment again.
+        assert!(Arc::ptr_eq(&first, &looks.of(&garment("denim"))));
+        looks.of(&garment("silk"));
+        assert_eq!(looks.0.len(), 2);
+        let worn = [garment("silk")];
+        looks.keep_garments(&worn.iter().collect::<Vec<_>>());
+        assert_eq!(looks.0.len(), 1);
+    }
 }

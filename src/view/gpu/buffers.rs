@@ -4,6 +4,7 @@ use crate::appearance::{Fabric, Print};
 use crate::area::{Area, NEAR};
 use crate::contact_shadow::{ContactShadows, NO_SHADOW};
 use crate::coverage::FOLD_GAP;
+use crate::grain::Grain;
 use crate::shading::Shader;
 use crate::surface::Surface;
 use crate::viewport::Viewport;
@@ -24,6 +25,8 @@ pub(super) struct SceneData {
     light: [f32; 4],
     limits: [f32; 4],
     room: [[f32; 4]; 3],
+    grain: [f32; 4],
+    picture: [u32; 4],
 }
 
 impl SceneData {
@@ -33,6 +36,7 @@ impl SceneData {
         samples: u32,
         behind: f32,
         shader: &Shader<'_>,
+        grain: Grain,
     ) -> Self {
         let k = viewport.sample_camera(area, samples);
         let lens = [k.fx, k.fy, k.cx + 0.5, k.cy + 0.5].map(|v| v as f32);
@@ -58,6 +62,8 @@ impl SceneData {
             light: [l.ground, l.inside, l.contact, shader.brightness],
             limits: [FOLD_GAP, l.contact_depth, NO_SHADOW, behind],
             room: shader.room_rows(),
+            grain: [grain.sigma / 255.0, 0.0, 0.0, 0.0],
+            picture: [grain.picture, 0, 0, 0],
         }
     }
 }

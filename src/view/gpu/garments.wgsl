@@ -22,6 +22,10 @@ struct Scene {
     red: vec4f,
     green: vec4f,
     blue: vec4f,
+    // Grain over 255.
+    grain: vec4f,
+    // Number of the picture.
+    picture: vec4u,
 }
 
 struct Fabric {
@@ -460,6 +464,15 @@ fn shadow_at(p: vec2i) -> vec3f {
     return mix(top, bottom, w.y).xyz;
 }
 
+fn noise(p: vec2u, picture: u32) -> f32 {
+    var h = p.x * 0x9e3779b9u + p.y * 0x85ebca6bu + picture * 0xc2b2ae35u;
+    h = (h ^ (h >> 16u)) * 0x7feb352du;
+    h = (h ^ (h >> 15u)) * 0x846ca68bu;
+    h = h ^ (h >> 16u);
+    let sum = (h & 255u) + ((h >> 8u) & 255u) + ((h >> 16u) & 255u) + (h >> 24u);
+    return (f32(sum) - 510.0) / 147.8;
+}
+
 // Blended as: colour + target · alpha.
 @fragment
 fn compose(@builtin(position) at: vec4f) -> @location(0) vec4f {
@@ -493,6 +506,8 @@ fn compose(@builtin(position) at: vec4f) -> @location(0) vec4f {
             }
             color /= f32(pixel.z);
         }
+        let speck = noise(vec2u(floor(at.xy) + scene.area.xy), scene.picture.x);
+        color = clamp(color + scene.grain.x * speck, vec3f(0.0), vec3f(1.0));
     }
     return vec4f(color * cover, dark * (1.0 - cover));
 }

@@ -9,6 +9,7 @@ use super::targets::{Targets, padded_row, write};
 use crate::area::Area;
 use crate::captured_depth::AreaDepth;
 use crate::composition::Composition;
+use crate::grain::Grain;
 use crate::room_light::RoomLight;
 use crate::shading::Shader;
 use crate::surface::Surface;
@@ -38,6 +39,13 @@ pub struct Renderer {
     /// Fabrics in the buffer of reliefs.
     cloths: Vec<Arc<ShadedCloth>>,
     failure: Failure,
+}
+
+/// Light of the room and grain of the camera in one picture.
+#[derive(Clone, Copy)]
+struct LitCamera<'a> {
+    room: Option<&'a RoomLight>,
+    grain: Grain,
 }
 
 /// Smallest storage buffer, bytes: an empty binding is not allowed.
@@ -149,8 +157,11 @@ impl Renderer {
         picture.see_body(model, state, input, work, &area);
         work.surface.visible.reset(work.surface.faces.len(), true);
         work.surface.shade_vertices(&model.config.lights);
-        let room = state.room_light.map(|(light, _)| light);
-        self.upload(model, &picture, &area, room.as_ref(), work);
+        let lit = LitCamera {
+            room: state.room_light.as_ref(),
+            grain: state.grain_of(input.frame.sequence),
+        };
+        self.upload(model, &picture, &area, lit, work);
         let targets = self.take_targets(&area, picture.samples);
         let passes = self.passes(&targets, area, picture.samples);
         self.rasterise(&passes, work)?;
@@ -173,7 +184,7 @@ impl Renderer {
         model: &Model,
         picture: &Composition<'_>,
         area: &Area,
-        room: Option<&RoomLight>,
+        lit: LitCamera<'_>,
         work: &Workspace,
     ) {
         let config = &model.config;
@@ -182,11 +193,18 @@ impl Renderer {
             picture.viewport.camera,
             &model.to_srgb,
             &config.lights,
-            room,
+            lit.room,
             picture.report.brightness,
         );
         let (viewport, samples) = (&picture.viewport, picture.samples);
-        let data = SceneData::new(viewport, area, samples, config.inner_bias, &shader);
+        let data = SceneData::new(
+            viewport,
+            area,
+            samples,
+            config.inner_bias,
+            &shader,
+            lit.grain,
+        );
         self.queue
             .write_buffer(&self.scene, 0, bytemuck::bytes_of(&data));
         for (slot, bytes) in geometry(&work.surface).iter().enumerate() {
