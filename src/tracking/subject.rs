@@ -141,9 +141,7 @@ impl SubjectFrame<'_> {
         let config = &self.model.config;
         workspace.fit.pairing.forget();
         let found = !state.is_following();
-        if found && state.pose_age > settings.forget {
-            state.reset(self.model);
-        }
+        self.forget(state);
         let is_new = found && state.size.frames == 0;
         let before = size_before(state, found);
         let start = if found {
@@ -206,12 +204,7 @@ impl SubjectFrame<'_> {
             if let Some(before) = before {
                 (state.size, state.shape) = before;
             }
-            let is_thing = state.belief.verdict == Verdict::Nobody;
-            return Err(if is_thing {
-                LostReason::Thing
-            } else {
-                LostReason::Disagreement
-            });
+            return Err(refusal(state));
         }
         let status = state.status;
         state.subject += u64::from(is_new);
@@ -224,6 +217,14 @@ impl SubjectFrame<'_> {
         let is_due = self.is_surface_due(good, state);
         workspace.surface_cells = is_due.then(|| self.person.cells.clone());
         Ok(())
+    }
+
+    /// Forgets a subject that was not seen for long.
+    fn forget(&self, state: &mut TrackerState) {
+        let is_absent = !state.is_following();
+        if is_absent && state.pose_age > self.model.config.step.forget {
+            state.reset(self.model);
+        }
     }
 
     /// The subject with a fitted pose.
@@ -521,6 +522,14 @@ impl SubjectFrame<'_> {
         *interval = (*interval).max(config.displacement_interval.max(1));
         let is_tracking = state.status == Status::Tracking;
         good && config.displacements && is_tracking && *wait == 0
+    }
+}
+
+/// Reason for which a subject is let go.
+fn refusal(state: &TrackerState) -> LostReason {
+    match state.belief.verdict {
+        Verdict::Nobody => LostReason::Thing,
+        _ => LostReason::Disagreement,
     }
 }
 

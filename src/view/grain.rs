@@ -85,7 +85,7 @@ mod tests {
             let (x, y) = (i % 160, i / 160);
             let base = 60.0
                 + 0.5 * x as f32
-                + if (x / 20 + y / 20) % 2 == 0 {
+                + if (x / 20 + y / 20).is_multiple_of(2) {
                     40.0
                 } else {
                     0.0

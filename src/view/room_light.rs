@@ -211,7 +211,7 @@ mod tests {
             let region = k % 3;
             let albedo = [0.6, 0.25, 0.05][region];
             // Every fifth is a fold or a print.
-            let odd = if k % 5 == 0 { 0.5 } else { 1.0 };
+            let odd = if k.is_multiple_of(5) { 0.5 } else { 1.0 };
             let e = albedo * odd * (1.0 + slope.dot(&normal)).max(0.0);
             LitPatch {
                 normal,
