@@ -1,7 +1,6 @@
 //! The part of a garment's picture that does not change: fabric, and places of its surface in the pattern.
 
-use std::sync::Arc;
-use tryon_garment::{FabricSample, RenderMesh};
+use tryon_garment::RenderMesh;
 use tryon_view::{Appearance, EdgePlace, Print, ShadedCloth, edge_places};
 
 /// Look of a garment, prepared once.
@@ -23,12 +22,9 @@ impl DrawnLook {
                 places: Vec::new(),
             };
         }
-        let cloth = FabricSample::named(fabric)
-            .map(|f| ShadedCloth::new(f.look, f.material.wrinkle_length() as f32))
-            .unwrap_or_default();
         Self {
             appearance: Appearance {
-                cloth: Some(Arc::new(cloth)),
+                cloth: Some(ShadedCloth::named(fabric)),
                 ..appearance
             },
             places: edge_places(&mesh.faces, &mesh.uv, &mesh.vertex),

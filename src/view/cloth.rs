@@ -4,7 +4,8 @@ use super::cloth_tile::{ClothTexel, ClothTile};
 use super::construction::EdgePlace;
 use super::edge_profile::EdgeProfile;
 use std::f32::consts::FRAC_1_SQRT_2;
-use tryon_garment::FabricLook;
+use std::sync::{Arc, OnceLock};
+use tryon_garment::{FabricLook, FabricSample, Material};
 
 /// Footprint of a pixel in pitches from which yarns are roughness alone.
 const YARNS_SEEN: f32 = 2.0;
@@ -68,6 +69,20 @@ pub(crate) struct ClothSample {
 }
 
 impl ShadedCloth {
+    /// Cloth of a preset ([`Material::PRESETS`]), prepared on first use and shared: 2 MB each. Another name is jersey's.
+    pub fn named(fabric: &str) -> Arc<Self> {
+        const COUNT: usize = Material::PRESETS.len();
+        static PREPARED: [OnceLock<Arc<ShadedCloth>>; COUNT] = [const { OnceLock::new() }; COUNT];
+        let number = Material::PRESETS.iter().position(|name| *name == fabric);
+        let number = number.unwrap_or(0);
+        let prepare = || {
+            let sample = FabricSample::named(Material::PRESETS[number]);
+            let cloth = sample.map(|f| Self::new(f.look, f.material.wrinkle_length() as f32));
+            Arc::new(cloth.unwrap_or_default())
+        };
+        Arc::clone(PREPARED[number].get_or_init(prepare))
+    }
+
     /// Prepares a look whose wrinkles are `wave` metres long.
     pub fn new(look: FabricLook, wave: f32) -> Self {
         Self {

@@ -107,7 +107,8 @@ mod tests {
         let mut looks = Looks::default();
         let [denim, silk, unknown] = ["denim", "silk", "mithril"].map(|f| looks.of(&garment(f)));
         assert_ne!(denim.appearance.cloth, silk.appearance.cloth);
-        assert_eq!(unknown.appearance.cloth, Some(Arc::default()), "jersey");
+        let jersey = tryon::view::ShadedCloth::named("jersey");
+        assert_eq!(unknown.appearance.cloth, Some(jersey));
         assert_eq!(
             (denim.appearance.base, denim.places.len()),
             ([0x20, 0x40, 0x60], 4)

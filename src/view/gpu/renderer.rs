@@ -359,7 +359,7 @@ mod tests {
     use crate::edge_places;
     use crate::tests::fixture::{RED, SKIN, Scenery, draw};
     use crate::{Config, Print};
-    use tryon_garment::{FabricImage, FabricSample};
+    use tryon_garment::FabricImage;
 
     /// An adapter, or a loud skip; an error when everything is required.
     fn renderer() -> Option<Renderer> {
@@ -456,8 +456,7 @@ mod tests {
         let vertex: Vec<u32> = (0..scenery.uv.len() as u32).collect();
         let places = edge_places(&scenery.shirt.faces, &scenery.uv, &vertex);
         for name in ["jersey", "fleece", "denim", "silk"] {
-            let look = FabricSample::named(name).expect("a preset").look;
-            scenery.appearance.cloth = Some(Arc::new(ShadedCloth::new(look, 0.026)));
+            scenery.appearance.cloth = Some(ShadedCloth::named(name));
             for output in [None, Some([500, 300]), Some([1200, 900])] {
                 let garments = [GarmentView {
                     places: &places,
