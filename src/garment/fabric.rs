@@ -98,6 +98,18 @@ impl FabricSample {
     }
 }
 
+impl Default for FabricLook {
+    /// That of jersey.
+    fn default() -> Self {
+        #[expect(
+            clippy::expect_used,
+            reason = "the file is part of the build; a test reads it"
+        )]
+        let jersey = FabricSample::named("jersey").expect("a preset");
+        jersey.look
+    }
+}
+
 impl FabricFile {
     fn fabric(self) -> Result<FabricSample, GarmentError> {
         let [warp, weft] = match (&self.tensile, &self.stretch) {

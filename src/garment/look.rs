@@ -75,25 +75,3 @@ pub struct FabricLook {
     /// Necklines and waists.
     pub upper: Finish,
 }
-
-impl Default for FabricLook {
-    /// Single jersey.
-    fn default() -> Self {
-        Self {
-            structure: Structure::Jersey,
-            pitch: 7e-4,
-            relief: 0.35,
-            unevenness: 0.035,
-            mottle: 0.02,
-            roughness: 0.7,
-            specular: 0.03,
-            fuzz: 0.25,
-            bulk: 8e-4,
-            lower: Finish::Hem {
-                width: 0.02,
-                rows: 2,
-            },
-            upper: Finish::Rib { width: 0.018 },
-        }
-    }
-}

@@ -5,17 +5,18 @@ use crate::registration::IndexImage;
 use crate::settings::ClothesColorSettings;
 use serde::{Deserialize, Serialize};
 use tryon_body::parts::BodyPart;
-use tryon_geometry::camera::{Calibration, ColorImage, RgbdFrame};
-use tryon_geometry::math::P3;
+use tryon_geometry::camera::RgbdFrame;
 use tryon_geometry::spatial::{Label, OrganisedCloud};
 
 /// Bins of brightness and of the shares of red and of green in it.
 const BINS: [usize; 3] = [4, 8, 8];
 /// Cells of a histogram.
 const CELLS: usize = BINS[0] * BINS[1] * BINS[2];
+/// Sum of the channels of white.
+const BRIGHTEST: f32 = 3.0 * 255.0;
 /// Shares of red and green that the bins span: even a saturated cloth keeps within them.
 const SHARES: [f32; 2] = [0.1, 0.6];
-/// Brightest value of a channel, as which black cloth counts for grey: the colour of near black is noise.
+/// Grey added to every colour, of 255: the hue of near black is noise.
 const DARK: f32 = 24.0;
 
 /// Shares of colours over trunk and head, and over the legs.
@@ -56,7 +57,7 @@ impl ClothesColors {
             } else {
                 continue;
             };
-            if let Some(rgb) = color_at(&model.calibration, color, &grid.points[k]) {
+            if let Some(rgb) = model.calibration.color_at(color, &grid.points[k]) {
                 shares.add(rgb);
             }
         }
@@ -91,7 +92,7 @@ impl ColorShares {
         let sum = r + g + b;
         let share =
             |c: f32| ((c + DARK) / (sum + 3.0 * DARK) - SHARES[0]) / (SHARES[1] - SHARES[0]);
-        let at = [sum / 765.0, share(r), share(g)];
+        let at = [sum / BRIGHTEST, share(r), share(g)];
         let mut low = [0; 3];
         let mut part = [0.0; 3];
         for d in 0..3 {
@@ -127,21 +128,6 @@ impl ColorShares {
         let pairs = self.shares.iter().zip(&other.shares);
         pairs.map(|(a, b)| (a * b).sqrt()).sum()
     }
-}
-
-/// Colour of a point of the depth camera; `None` beside the picture.
-fn color_at(calibration: &Calibration, color: &ColorImage, at: &P3) -> Option<[u8; 3]> {
-    let camera = calibration.color.as_ref().unwrap_or(&calibration.depth);
-    let iso = calibration.color_from_depth.iso().cast::<f32>();
-    let pixel = camera.project(&(iso * at));
-    // A registered picture may be larger than the depth image.
-    let scale = [
-        color.width() as f32 / camera.width as f32,
-        color.height() as f32 / camera.height as f32,
-    ];
-    let [u, v] = [pixel.x * scale[0], pixel.y * scale[1]].map(f32::round);
-    let is_inside = u >= 0.0 && v >= 0.0 && u < color.width() as f32 && v < color.height() as f32;
-    is_inside.then(|| color.at(u as u32, v as u32))
 }
 
 #[cfg(test)]

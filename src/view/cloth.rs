@@ -3,7 +3,7 @@
 use super::cloth_tile::{ClothTexel, ClothTile};
 use super::construction::EdgePlace;
 use super::edge_profile::EdgeProfile;
-use std::f32::consts::FRAC_1_SQRT_2;
+use std::f32::consts::{FRAC_1_SQRT_2, TAU};
 use std::sync::{Arc, OnceLock};
 use tryon_garment::{FabricLook, FabricSample, Material};
 
@@ -15,11 +15,12 @@ const SURFACE_SEEN: f32 = 6e-3;
 const RIB: f32 = 2.6e-3;
 const RIB_SLOPE: f32 = 0.9;
 const RIB_SHADE: f32 = 0.12;
-/// Steepest slope of puckers along an edge.
+/// Steepest slope of puckers along an edge, their reach on both sides of the stitches in waves, and the second wave over the
+/// first: no simple ratio, so that no two puckers are alike.
 const PUCKER: f32 = 0.09;
+const PUCKER_REACH: f32 = 1.5;
+const SECOND_WAVE: f32 = 1.7;
 
-/// Length of jersey's wrinkles, metres.
-const WAVE: f32 = 0.026;
 /// Cosine and sine of the directions across which the ridges of each field run.
 const ACROSS: [[f32; 2]; 4] = [
     [1.0, 0.0],
@@ -44,13 +45,6 @@ pub struct ShadedCloth {
     upper: EdgeProfile,
 }
 
-impl Default for ShadedCloth {
-    /// Jersey.
-    fn default() -> Self {
-        Self::new(FabricLook::default(), WAVE)
-    }
-}
-
 impl PartialEq for ShadedCloth {
     fn eq(&self, other: &Self) -> bool {
         self.look == other.look
@@ -70,15 +64,22 @@ pub(crate) struct ClothSample {
 
 impl ShadedCloth {
     /// Cloth of a preset ([`Material::PRESETS`]), prepared on first use and shared: 2 MB each. Another name is jersey's.
+    ///
+    /// # Panics
+    /// Never in a build that passes its tests: the presets are part of the build.
     pub fn named(fabric: &str) -> Arc<Self> {
         const COUNT: usize = Material::PRESETS.len();
         static PREPARED: [OnceLock<Arc<ShadedCloth>>; COUNT] = [const { OnceLock::new() }; COUNT];
         let number = Material::PRESETS.iter().position(|name| *name == fabric);
         let number = number.unwrap_or(0);
+        #[expect(
+            clippy::expect_used,
+            reason = "the presets are part of the build; a test reads them"
+        )]
         let prepare = || {
-            let sample = FabricSample::named(Material::PRESETS[number]);
-            let cloth = sample.map(|f| Self::new(f.look, f.material.wrinkle_length() as f32));
-            Arc::new(cloth.unwrap_or_default())
+            let fabric = FabricSample::named(Material::PRESETS[number]).expect("a preset");
+            let wave = fabric.material.wrinkle_length() as f32;
+            Arc::new(Self::new(fabric.look, wave))
         };
         Arc::clone(PREPARED[number].get_or_init(prepare))
     }
@@ -129,14 +130,7 @@ impl ShadedCloth {
             } else {
                 &self.lower
             };
-            edge(
-                profile,
-                place.free,
-                place.along,
-                footprint,
-                &mut out,
-                [2, 3],
-            );
+            edge(profile, place, footprint, &mut out);
         }
         if place.seam < reach {
             let [slope, taken] = self.seam.mean(place.seam, footprint);
@@ -145,9 +139,7 @@ impl ShadedCloth {
         }
         out
     }
-}
 
-impl ShadedCloth {
     /// Adds wrinkles of these slopes across each of [`ACROSS`].
     #[inline]
     fn wrinkle(&self, uv: [f32; 2], ridges: [f32; 4], footprint: f32, out: &mut ClothSample) {
@@ -223,30 +215,23 @@ impl ShadedCloth {
 }
 
 /// Adds a free edge: its profile, ribs across a band, puckers beside stitches.
-fn edge(
-    profile: &EdgeProfile,
-    distance: f32,
-    along: f32,
-    footprint: f32,
-    out: &mut ClothSample,
-    [across, lengthwise]: [usize; 2],
-) {
+fn edge(profile: &EdgeProfile, place: &EdgePlace, footprint: f32, out: &mut ClothSample) {
+    let distance = place.free;
     let [slope, taken] = profile.mean(distance, footprint);
-    out.slopes[across] += slope;
+    out.slopes[2] += slope;
     out.tone *= 1.0 - taken;
     let seen = |wave: f32| (1.0 - footprint / (0.5 * wave)).clamp(0.0, 1.0);
-    let turn = |wave: f32| std::f32::consts::TAU * (along / wave).fract();
+    let turn = |wave: f32| TAU * (place.along / wave).fract();
     if distance < profile.ribs {
         let (s, c) = turn(RIB).sin_cos();
-        out.slopes[lengthwise] += RIB_SLOPE * seen(RIB) * c;
+        out.slopes[3] += RIB_SLOPE * seen(RIB) * c;
         out.tone *= 1.0 - RIB_SHADE * (1.0 - seen(RIB) * s);
         out.variance += 0.5 * RIB_SLOPE * RIB_SLOPE * (1.0 - seen(RIB));
     }
     let [wave, at] = profile.pucker;
     if wave > 0.0 {
-        let near = (1.0 - (distance - at).abs() / (1.5 * wave)).max(0.0);
-        // Two waves that don't repeat together: no two puckers are alike.
-        let uneven = turn(wave).cos() + turn(1.7 * wave).sin();
-        out.slopes[lengthwise] += PUCKER * near * seen(wave) * uneven;
+        let near = (1.0 - (distance - at).abs() / (PUCKER_REACH * wave)).max(0.0);
+        let uneven = turn(wave).cos() + turn(SECOND_WAVE * wave).sin();
+        out.slopes[3] += PUCKER * near * seen(wave) * uneven;
     }
 }

@@ -3,16 +3,17 @@
 use super::area::Area;
 use super::captured::{brightness, captured};
 use super::captured_depth::AreaDepth;
+use super::captured_pixels::CapturedPixels;
 use super::config::{Config, Model};
 use super::coverage::remove_biases;
 use super::evidence::{Evidence, PixelDepths};
 use super::grain;
-use super::hand::{ArmScene, CapturedPixels, LayerDepths, PosedLimbs};
+use super::hand::{ArmScene, LayerDepths, PosedLimbs};
 use super::input::{Input, RenderError};
 use super::matte::MatteInput;
 use super::off_person::{OffPerson, OffPersonInput};
 use super::report::{HandReport, RenderReport};
-use super::room_light::{LitScene, RoomLight};
+use super::room_light::RoomLight;
 use super::settings::{BareArmSettings, OffPersonSettings};
 use super::silhouette_grid::DressedArea;
 use super::state::State;
@@ -88,6 +89,15 @@ impl<'a> Composition<'a> {
         let ms = self.clock.elapsed().as_secs_f32() * 1e3;
         self.report.stages_ms.push((stage, ms));
         self.clock = Instant::now();
+    }
+
+    /// Colours and depth as they were captured.
+    fn captured(&self) -> CapturedPixels<'_> {
+        CapturedPixels {
+            viewport: &self.viewport,
+            image: &self.image,
+            depth: self.depth.data(),
+        }
     }
 
     /// Draws the tracked body into `work.body`, and measures light of the room and grain if that is due. Before all that
@@ -168,14 +178,10 @@ impl<'a> Composition<'a> {
         if !state.is_room_due(settings.interval, time_ns) {
             return;
         }
-        let scene = LitScene {
-            viewport: &self.viewport,
-            image: &self.image,
-            depth: self.depth.data(),
-        };
+        let captured = self.captured();
         let vertices = work.body.vertices(input, &body);
-        let light = RoomLight::measure(&scene, &body, vertices, settings);
-        let has_reading = |u, v| scene.depth_at(u, v).is_some_and(|z| z > 0.0);
+        let light = RoomLight::measure(&captured, &body, vertices, settings);
+        let has_reading = |u, v| captured.metres(u, v) > 0.0;
         let grain = grain::measure(&self.image, has_reading, &config.grain);
         state.take_room(light, grain, time_ns, settings);
     }
@@ -221,11 +227,7 @@ impl<'a> Composition<'a> {
         };
         let (pixels, depths, width) = (&work.pixels, &work.body, area.width as usize);
         let scene = ArmScene {
-            view: CapturedPixels {
-                viewport: &self.viewport,
-                image: &self.image,
-                depth: self.depth.data(),
-            },
+            view: self.captured(),
             body: PosedLimbs {
                 limbs: body.limbs,
                 vertices: depths.vertices(input, &body),

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use tryon_geometry::mesh::{Face, UnionFind, boundary_edges, undirected};
 
-/// Distance beyond which nothing of an edge is seen, metres: the widest band.
+/// Distance beyond which nothing of an edge is seen, metres: the reach of its profile, and half a far pixel.
 const REACH: f32 = 0.08;
 
 /// Place of a drawn vertex in its panel.

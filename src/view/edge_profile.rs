@@ -11,6 +11,20 @@ const ROWS: [f32; 2] = [2e-3, 6e-3];
 /// Half width of a row of stitches, and of the step where a turned edge ends, metres.
 const STITCH: f32 = 6e-4;
 const SHOULDER: f32 = 8e-4;
+/// Relief of a cut edge, of a ribbed and of a smooth band in units of the bulk, which is that of a hem's two layers: one layer
+/// alone, and two with the seam's allowance between them, of stretched and of stiffened cloth.
+const CUT: f32 = 0.3;
+const RIBBED: f32 = 1.3;
+const STIFFENED: f32 = 1.5;
+/// Half width of the groove between two panels, and where a rib is sewn on, metres; of the dark line at its bottom there.
+const GROOVE: [f32; 2] = [1e-3, 1.2e-3];
+const GROOVE_LINE: f32 = 8e-4;
+/// Row of stitches that holds a rib's allowance, beyond the seam, metres, and its share of a hem's: it lies under tension.
+const RIB_ROW: f32 = 3e-3;
+const RIB_PULL: [f32; 2] = [0.4, 0.5];
+/// Waves of puckers along a hem and a rib, metres: two stitches and a half of 2.5 to 3 mm; and how far beyond a rib they lie.
+const PUCKERS: [f32; 2] = [7e-3, 5e-3];
+const RIB_PUCKERS: f32 = 2e-3;
 /// Depth of stitches and of the groove of a seam in units of the bulk, and the light that their threads and grooves take.
 const PULL: [f32; 2] = [0.7, 1.0];
 const TAKEN: [f32; 2] = [0.22, 0.35];
@@ -25,7 +39,7 @@ pub(crate) struct EdgeProfile {
     height: Vec<f32>,
     /// Integral of the light taken, metres.
     taken: Vec<f32>,
-    /// Reach of the puckers along the edge, and distance at which they are strongest, metres; none at 0.
+    /// Wave of the puckers along the edge, and distance at which they are strongest, metres; none at 0.
     pub(crate) pucker: [f32; 2],
     /// Distance up to which ribs run across; 0 without.
     pub(crate) ribs: f32,
@@ -64,7 +78,7 @@ impl EdgeProfile {
     /// Two panels sewn together: a groove between the layers of the allowance.
     pub(crate) fn seam(bulk: f32) -> Self {
         let curve = |d: f32| {
-            let groove = bump(d, 0.0, 1.0e-3);
+            let groove = bump(d, 0.0, GROOVE[0]);
             let below = 0.5 * (1.0 - rise(d, ALLOWANCE, 4.0 * SHOULDER));
             [
                 bulk * (below - PULL[1] * groove),
@@ -78,7 +92,7 @@ impl EdgeProfile {
     pub(crate) fn free(finish: Finish, bulk: f32) -> Self {
         let fold = |d: f32| 1.0 - (1.0 - (d / FOLD).min(1.0)).powi(2);
         match finish {
-            Finish::Raw => Self::of(|d| [0.3 * bulk * fold(d), 0.0], [0.0; 2], 0.0),
+            Finish::Raw => Self::of(|d| [CUT * bulk * fold(d), 0.0], [0.0; 2], 0.0),
             Finish::Hem { width, rows } => {
                 let curve = move |d: f32| {
                     let layers = fold(d) * (1.0 - rise(d, width, SHOULDER));
@@ -86,26 +100,28 @@ impl EdgeProfile {
                     let stitches: f32 = (0..rows).map(row).sum();
                     [bulk * (layers - PULL[0] * stitches), TAKEN[0] * stitches]
                 };
-                Self::of(curve, [7e-3, width - ROWS[0]], 0.0)
+                Self::of(curve, [PUCKERS[0], width - ROWS[0]], 0.0)
             }
             Finish::Rib { width } => {
                 let curve = move |d: f32| {
                     let band = fold(d) * (1.0 - rise(d, width, SHOULDER));
-                    let groove = bump(d, width, 1.2e-3);
-                    let stitches = bump(d, width + 3e-3, STITCH);
+                    let groove = bump(d, width, GROOVE[1]);
+                    let stitches = bump(d, width + RIB_ROW, STITCH);
                     [
-                        bulk * (1.3 * band - PULL[1] * groove - 0.4 * stitches),
-                        TAKEN[1] * bump(d, width, 8e-4) + 0.5 * TAKEN[0] * stitches,
+                        bulk * (RIBBED * band - PULL[1] * groove - RIB_PULL[0] * stitches),
+                        TAKEN[1] * bump(d, width, GROOVE_LINE) + RIB_PULL[1] * TAKEN[0] * stitches,
                     ]
                 };
-                Self::of(curve, [5e-3, width + 2e-3], width)
+                Self::of(curve, [PUCKERS[1], width + RIB_PUCKERS], width)
             }
             Finish::Band { width } => {
                 let curve = move |d: f32| {
                     let band = fold(d) * (1.0 - rise(d, width, SHOULDER));
                     let stitches = bump(d, ROWS[0], STITCH) + bump(d, width - ROWS[0], STITCH);
                     [
-                        bulk * (1.5 * band - PULL[0] * stitches - PULL[1] * bump(d, width, STITCH)),
+                        bulk * (STIFFENED * band
+                            - PULL[0] * stitches
+                            - PULL[1] * bump(d, width, STITCH)),
                         TAKEN[0] * stitches + TAKEN[1] * bump(d, width, STITCH),
                     ]
                 };

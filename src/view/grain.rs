@@ -9,8 +9,7 @@ const MEDIAN: f32 = 0.6745;
 const GAIN: f32 = 6.0;
 
 /// Standard deviation of the noise of a captured picture where `has_reading` of column and row, grey levels; `None` with too
-/// little to see. The kernel
-/// `[1 −2 1; −2 4 −2; 1 −2 1]` takes away everything smooth (Immerkær 1996); the median, edges.
+/// little to see. The kernel `[1 −2 1; −2 4 −2; 1 −2 1]` takes away everything smooth (Immerkær 1996); the median, edges.
 pub(crate) fn measure(
     image: &ColorImage,
     has_reading: impl Fn(u32, u32) -> bool,

@@ -67,6 +67,7 @@ mod blend;
 mod body_depth;
 mod captured;
 pub(crate) mod captured_depth;
+mod captured_pixels;
 mod cloth;
 mod cloth_tile;
 pub(crate) mod composition;

@@ -3,56 +3,27 @@
 //! A surface of albedo ρ in distant light looks like ρ (1 + k·n) to first order (Ramamoorthi & Hanrahan 2001). Each part of the
 //! body has an albedo of its own; one k for each channel explains them all.
 
+use super::captured_pixels::CapturedPixels;
 use super::input::BodyView;
 use super::settings::RoomLightSettings;
 use super::srgb::linear;
-use super::viewport::Viewport;
 use nalgebra::{Matrix4, Vector4};
 use serde::{Deserialize, Serialize};
 use tryon_body::parts::BodyPart;
-use tryon_geometry::camera::ColorImage;
 use tryon_geometry::math::{P3, V3};
 
-/// Parts of the body with an albedo of their own.
-const REGIONS: usize = 4;
+/// Parts of the body with an albedo of their own: trunk with the head, arms, legs.
+const REGIONS: usize = 3;
+/// Least factor of the mean that the albedos left: a fit that goes astray divides by no less.
+const LEAST_MEAN: f32 = 0.2;
 /// Rounds of albedo and light in turns, each with new weights.
 const ROUNDS: usize = 8;
 
-/// Light of a room: `level · color · (1 + slope·n)` on a surface of normal n (picture's camera).
+/// Light of a room by channel, over its mean: 1 + slope·n on a surface of normal n (picture's camera).
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct RoomLight {
     /// Change with the normal over the mean, for red, green and blue: each vector points to where that colour comes from.
     pub slope: [[f32; 3]; 3],
-}
-
-/// Captured colours and depth, from the picture's camera.
-#[derive(Clone, Copy)]
-pub(crate) struct LitScene<'a> {
-    pub(crate) viewport: &'a Viewport,
-    pub(crate) image: &'a ColorImage,
-    /// Millimetres, shape `viewport.depth`.
-    pub(crate) depth: &'a [u16],
-}
-
-impl LitScene<'_> {
-    /// Colour and depth (metres) where a point is seen; `None` beside the picture.
-    fn at(&self, p: &P3) -> Option<([u8; 3], f32)> {
-        let q = self.viewport.camera.project(p);
-        let [u, v] = [q.x, q.y].map(f32::round);
-        let (width, height) = (self.image.width() as f32, self.image.height() as f32);
-        if !(u >= 0.0 && v >= 0.0 && u < width && v < height) {
-            return None;
-        }
-        let (u, v) = (u as u32, v as u32);
-        Some((self.image.at(u, v), self.depth_at(u, v)?))
-    }
-
-    /// Depth at a pixel of the picture, metres, 0 = no reading; `None` beside the depth image.
-    pub(crate) fn depth_at(&self, u: u32, v: u32) -> Option<f32> {
-        let [x, y] = [self.viewport.depth_at(0, u)?, self.viewport.depth_at(1, v)?];
-        let mm = self.depth[(y * self.viewport.depth[0] + x) as usize];
-        Some(f32::from(mm) * 1e-3)
-    }
 }
 
 /// A lit patch of the body.
@@ -67,12 +38,12 @@ struct LitPatch {
 impl RoomLight {
     /// Light of the tracked body's captured colours; `None` with too few of them, or all alike.
     pub(crate) fn measure(
-        scene: &LitScene<'_>,
+        captured: &CapturedPixels<'_>,
         body: &BodyView<'_>,
         vertices: &[P3],
         settings: &RoomLightSettings,
     ) -> Option<Self> {
-        let patches = patches(scene, body, vertices, settings);
+        let patches = patches(captured, body, vertices, settings);
         Self::fit(&patches, settings)
     }
 
@@ -109,7 +80,7 @@ impl RoomLightSettings {
 
 /// Patches of the body's surface that the camera sees.
 fn patches(
-    scene: &LitScene<'_>,
+    captured: &CapturedPixels<'_>,
     body: &BodyView<'_>,
     vertices: &[P3],
     settings: &RoomLightSettings,
@@ -123,7 +94,7 @@ fn patches(
         if !(facing > settings.least_facing) {
             return None;
         }
-        let (rgb, depth) = scene.at(&P3::from(centre))?;
+        let (rgb, depth) = captured.at(&P3::from(centre))?;
         // The skin, or cloth over it, and not something in between.
         if !(depth > 0.0 && (depth - centre.z).abs() < settings.most_apart) {
             return None;
@@ -139,7 +110,7 @@ fn patches(
     body.faces.iter().step_by(step).filter_map(patch).collect()
 }
 
-/// Trunk with the head, arms, each leg.
+/// Number of a vertex's part among those with an albedo of their own.
 fn region(body: &BodyView<'_>, vertex: u32) -> usize {
     match body.limbs.part(vertex) {
         Some(BodyPart::LeftArm | BodyPart::RightArm) => 1,
@@ -189,7 +160,7 @@ fn fit_channel(patches: &[LitPatch], c: usize, settings: &RoomLightSettings) -> 
         let Some(x) = normal.cholesky().map(|n| n.solve(&right)) else {
             break;
         };
-        slope = V3::new(x[1], x[2], x[3]) / (1.0 + x[0]).max(0.2);
+        slope = V3::new(x[1], x[2], x[3]) / (1.0 + x[0]).max(LEAST_MEAN);
         let length = slope.norm();
         if length > settings.most_slope {
             slope *= settings.most_slope / length;

@@ -19,9 +19,9 @@ settings! {
         pub interval: f64 = 0.25,
         /// Time in which a new light takes the place of an old one, seconds. Smaller flickers with the pose.
         pub memory: f32 = 1.5,
-        /// Patches of the body looked at, at most; and least, of which a light is told.
+        /// Patches of the body looked at, at most. More cost time.
         pub most_patches: usize = 3000,
-        /// See `most_patches`.
+        /// Patches of which a light is told, at least. Fewer fit folds.
         pub least_patches: usize = 150,
         /// Cosine of the viewing angle below which a patch is an outline.
         pub least_facing: f32 = 0.25,

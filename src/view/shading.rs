@@ -23,6 +23,18 @@ const SHEEN_POWER: i32 = 16;
 /// Sheen of satin at its brightest.
 const SHEEN: f32 = 0.25;
 
+/// Share of the cloth's own light that fibres standing off hide along the outline, and what they reflect there: some light
+/// unchanged at their surface, half of the rest through their dye.
+const FUZZ_HIDES: f32 = 0.5;
+const FUZZ_WHITE: f32 = 0.15;
+const FUZZ_DYED: f32 = 0.5;
+
+/// Direction of a vector; zero for zero.
+#[inline]
+fn unit(v: V3) -> V3 {
+    v * v.norm_squared().max(f32::MIN_POSITIVE).sqrt().recip()
+}
+
 /// Surface, camera and light of one picture.
 pub(crate) struct Shader<'a> {
     pub(crate) surface: &'a Surface,
@@ -55,7 +67,7 @@ impl Default for ShadedFace {
         Self {
             face: u32::MAX,
             gradient: [V3::zeros(); 3],
-            corners: [[0.0; 16]; 3],
+            corners: [VertexAttributes::default(); 3],
             along: [V3::zeros(); 5],
         }
     }
@@ -70,7 +82,7 @@ impl<'a> Shader<'a> {
         room: Option<&RoomLight>,
         brightness: f32,
     ) -> Self {
-        let unit = |d: [f32; 3]| {
+        let direction = |d: [f32; 3]| {
             V3::from(d)
                 .try_normalize(0.0)
                 .unwrap_or_else(|| V3::new(0.0, -1.0, 0.0))
@@ -83,8 +95,8 @@ impl<'a> Shader<'a> {
             camera,
             to_srgb,
             lights: *lights,
-            up: unit(lights.up),
-            key: key.unwrap_or_else(|| unit(lights.key_direction)),
+            up: direction(lights.up),
+            key: key.unwrap_or_else(|| direction(lights.key_direction)),
             lamp: mean.map_or(lights.key, |m| lights.key * m.norm().min(1.0)),
             level: 0.5 * (lights.sky + lights.ground) + lights.key * WRAP / (1.0 + WRAP),
             room: slopes,
@@ -114,9 +126,9 @@ impl<'a> Shader<'a> {
         shadow: f32,
     ) -> [f32; 3] {
         let s = self.surface;
+        let fabric = &s.fabrics[usize::from(s.garment[face as usize])];
         if cache.face != face {
             let f = s.faces[face as usize].map(|i| i as usize);
-            let fabric = &s.fabrics[usize::from(s.garment[face as usize])];
             *cache = ShadedFace::new(
                 face,
                 f.map(|i| s.vertices[i].coords),
@@ -153,8 +165,7 @@ impl<'a> Shader<'a> {
 
         let facing = n.dot(&eye).abs().max(GRAZING);
         let footprint = z / (self.camera.fx as f32 * facing);
-        let fabric = &s.fabrics[usize::from(s.garment[face as usize])];
-        let mut albedo = fabric.albedo([tu, tv], footprint);
+        let albedo = fabric.albedo([tu, tv], footprint);
 
         let side = if is_inner { self.lights.inside } else { 1.0 };
         let gain = self.brightness * side * (1.0 - shadow);
@@ -174,9 +185,8 @@ impl<'a> Shader<'a> {
         let tilt: V3 = (cache.along.iter().zip(relief.slopes))
             .map(|(g, s)| g * s)
             .sum();
-        let tilted = n - if is_inner { -tilt } else { tilt };
-        let n = tilted * tilted.norm_squared().max(f32::MIN_POSITIVE).sqrt().recip();
-        albedo = albedo.map(|a| a * relief.tone);
+        let n = unit(n - if is_inner { -tilt } else { tilt });
+        let albedo = albedo.map(|a| a * relief.tone);
         let light = ClothLight {
             shader: self,
             normal: n,
@@ -216,8 +226,7 @@ impl<'a> Shader<'a> {
         if !(gloss > 0.0) {
             return 0.0;
         }
-        let half = self.key + eye;
-        let half = half * half.norm_squared().max(f32::MIN_POSITIVE).sqrt().recip();
+        let half = unit(self.key + eye);
         gloss * SHEEN * n.dot(&half).max(0.0).powi(SHEEN_POWER) * self.lights.key
     }
 }
@@ -245,8 +254,7 @@ impl ClothLight<'_> {
         let towards = n.dot(&key).max(0.0);
         // Slopes within the pixel widen the highlight.
         let alpha = (look.roughness.powi(2) + 2.0 * variance).min(1.0);
-        let half = key + self.eye;
-        let half = half * half.norm_squared().max(f32::MIN_POSITIVE).sqrt().recip();
+        let half = unit(key + self.eye);
         let h = n.dot(&half).max(0.0);
         let a2 = alpha * alpha;
         let spread = h * h * (a2 - 1.0) + 1.0;
@@ -255,8 +263,8 @@ impl ClothLight<'_> {
         let fresnel = look.specular + (1.0 - look.specular) * edge;
         let shine = fresnel * lobe * towards * self.shader.lamp * self.open.min(1.0);
         std::array::from_fn(|c| {
-            let body = albedo[c] * (1.0 - 0.5 * fuzz);
-            (body + fuzz * (0.15 + 0.5 * albedo[c])) * light[c] + shine
+            let body = albedo[c] * (1.0 - FUZZ_HIDES * fuzz);
+            (body + fuzz * (FUZZ_WHITE + FUZZ_DYED * albedo[c])) * light[c] + shine
         })
     }
 }

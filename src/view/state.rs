@@ -1,4 +1,5 @@
-//! Memory between pictures: colours of one user's skin and clothes, time of the last measurement.
+//! Memory between pictures: colours of one user's skin and clothes, light of the room, grain of the camera, times of the last
+//! measurements.
 
 use super::grain::Grain;
 use super::room_light::RoomLight;

@@ -1,7 +1,7 @@
 //! Vertex attributes of visible faces: normals, openness in folds, sides.
 
 use super::config::Lights;
-use super::surface::Surface;
+use super::surface::{Surface, VertexAttributes};
 use tryon_geometry::math::V3;
 use tryon_geometry::mesh::face_normal;
 
@@ -107,7 +107,8 @@ impl Surface {
 
     fn write_attributes(&mut self) -> usize {
         let mut skipped = 0;
-        self.attributes.resize(self.vertices.len(), [0.0; 16]);
+        let none = VertexAttributes::default();
+        self.attributes.resize(self.vertices.len(), none);
         for (i, out) in self.attributes.iter_mut().enumerate() {
             if !self.scratch.is_visible[i] {
                 skipped += 1;
@@ -121,7 +122,7 @@ impl Surface {
             let upper = f32::from(u8::from(place.is_upper));
             let [x, y, area] = self.scratch.compression[i];
             let ridges = ridges([x, y].map(|m| m / area.max(f32::MIN_POSITIVE)));
-            *out = [0.0; 16];
+            *out = none;
             out[..4].copy_from_slice(&[n.x, n.y, n.z, open]);
             out[4..8].copy_from_slice(&[u, v, z, free]);
             out[8..11].copy_from_slice(&[place.along, seam, upper]);

@@ -1,4 +1,4 @@
-//! Who comes back after a loss keeps the body that was measured; who comes instead is measured anew.
+//! Identity after a loss: the same person keeps the measured body, another one is measured anew.
 
 use tryon::body::BodyShape;
 use tryon::body::embedded::{self, DIRECTIONS};

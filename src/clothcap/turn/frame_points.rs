@@ -3,7 +3,7 @@
 use crate::scan::BodyScan;
 use crate::settings::FramePointSettings;
 use nalgebra::{Matrix3, Vector3};
-use tryon_geometry::camera::{Calibration, ColorImage, DepthImage, Intrinsics, RgbdFrame};
+use tryon_geometry::camera::{Calibration, DepthImage, Intrinsics, RgbdFrame};
 use tryon_geometry::math::{Camera, P3, Rigid, V3, World};
 use tryon_geometry::par::{self, Par};
 use tryon_geometry::spatial::PointTree;
@@ -34,27 +34,15 @@ pub(super) fn camera_points(
     };
     for (point, normal) in local.into_iter().flatten() {
         if let Some(color) = &frame.color {
-            out.colors.push(color_at(color, calibration, &point));
+            // Black outside of the image.
+            out.colors
+                .push(calibration.color_at(color, &point).unwrap_or_default());
         }
         out.point_of_row.push(out.points.len() as u32);
         out.points.push(point);
         out.normals.push(normal);
     }
     out
-}
-
-/// Colour where a point of the depth camera is seen; black outside of the image.
-fn color_at(image: &ColorImage, calibration: &Calibration, point: &P3) -> [u8; 3] {
-    let camera = calibration.color.as_ref().unwrap_or(&calibration.depth);
-    let at = calibration.color_from_depth.point(&point.cast()).cast();
-    let q = camera.project(&at);
-    let (u, v) = (q.x.round(), q.y.round());
-    let inside = u >= 0.0 && v >= 0.0 && u < image.width() as f32 && v < image.height() as f32;
-    if inside {
-        image.at(u as u32, v as u32)
-    } else {
-        [0; 3]
-    }
 }
 
 struct DepthReader<'a> {

@@ -1,9 +1,10 @@
 //! Detection of bare arms: skin-coloured cells grown from the tracked arm.
 
 use super::grid::ArmGrid;
-use super::sampling::{CapturedPixels, PosedLimbs, sample_and_fit};
+use super::sampling::{PosedLimbs, sample_and_fit};
 use crate::area::{Area, NEAR};
 use crate::arm::ArmAxis;
+use crate::captured_pixels::CapturedPixels;
 use crate::evidence::{Evidence, depth_sigma};
 use crate::report::HandReport;
 use crate::settings::BareArmSettings;

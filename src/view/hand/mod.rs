@@ -8,4 +8,4 @@ mod grid;
 mod sampling;
 
 pub(super) use detect::{ArmScene, HandDetector, LayerDepths};
-pub(super) use sampling::{CapturedPixels, PosedLimbs};
+pub(super) use sampling::PosedLimbs;

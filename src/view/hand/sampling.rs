@@ -2,23 +2,13 @@
 
 use crate::area::NEAR;
 use crate::arm::ArmAxis;
+use crate::captured_pixels::CapturedPixels;
 use crate::evidence::depth_sigma;
 use crate::limbs::Limbs;
 use crate::settings::BareArmSettings;
 use crate::skin::SkinClassifier;
 use crate::state::{ColorRegion, State};
-use crate::viewport::Viewport;
-use tryon_geometry::camera::ColorImage;
 use tryon_geometry::math::P3;
-
-/// Captured picture and depth.
-pub(crate) struct CapturedPixels<'a> {
-    pub(crate) viewport: &'a Viewport,
-    /// The captured picture at the output's size.
-    pub(crate) image: &'a ColorImage,
-    /// Captured depth, millimetres, shape `viewport.depth`.
-    pub(crate) depth: &'a [u16],
-}
 
 /// Posed body in the picture's camera, metres.
 pub(crate) struct PosedLimbs<'a> {
@@ -27,13 +17,6 @@ pub(crate) struct PosedLimbs<'a> {
 }
 
 impl CapturedPixels<'_> {
-    /// Captured depth at a pixel, metres; 0 = none.
-    pub(super) fn metres(&self, u: u32, v: u32) -> f32 {
-        let at = (self.viewport.depth_at(0, u), self.viewport.depth_at(1, v));
-        let (Some(x), Some(y)) = at else { return 0.0 };
-        f32::from(self.depth[(y * self.viewport.depth[0] + x) as usize]) * 1e-3
-    }
-
     /// Colour at `p` if the captured surface there and around it is the body's, within `tolerance` metres; around it at `radius` depth pixels.
     fn color(&self, p: &P3, tolerance: f32, radius: f64) -> Option<[u8; 3]> {
         if p.z.is_nan() || p.z <= NEAR {
