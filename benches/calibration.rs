@@ -242,7 +242,7 @@ impl Case {
             ..Setting::default()
         };
         let mut actor = Actor {
-            appearance: self.appearance,
+            appearance: self.appearance.into(),
             ..Actor::default()
         };
         actor.shape.coefficients = self.shape.to_vec();

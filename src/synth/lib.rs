@@ -11,12 +11,22 @@
 //!
 //! Evidence:
 //!
-//! - Synthetic people and their truth: [`mod@sequence`], [`mod@routine`], [`mod@posture`], [`mod@room`], drawn by [`mod@room_view`].
+//! - Synthetic people and their truth: [`mod@sequence`], [`mod@routine`], [`mod@posture`], [`mod@room`], drawn by [`mod@room_view`] and [`mod@body_view`].
+//! - Appearance: [`mod@actor`], [`mod@paint`], [`mod@figure`] with [`mod@figure_head`]; [`mod@backdrop`]; light: [`mod@material`],
+//!   [`mod@shadow_map`], [`mod@floor_shadow`].
 #![allow(rustdoc::private_intra_doc_links)] // the index of ideas names private modules
 
+mod actor;
+mod backdrop;
+mod body_view;
 mod clip;
+mod figure;
+mod figure_head;
+mod floor_shadow;
 mod furniture;
+mod grain;
 pub mod labelled;
+mod material;
 mod paint;
 mod physique;
 mod posture;
@@ -27,18 +37,21 @@ mod room_view;
 mod routine;
 mod sequence;
 mod settings;
+mod shadow_map;
 mod shop;
 mod source;
 mod stance;
 
+pub use actor::{Actor, Appearance};
+pub use backdrop::Backdrop;
 pub use clip::ClipError;
 pub use furniture::{Piece, overlay};
 pub use physique::{Belly, Covering, Physique};
 pub use posture::Posture;
 pub use room::Room;
 pub use routine::Routine;
-pub use sequence::{Actor, SeparateColor, Sequence, Setting, Truth};
-pub use settings::{CoveringSettings, LightSettings, ShopSettings, StanceSettings};
+pub use sequence::{ColorImaging, SeparateColor, Sequence, Setting, Truth};
+pub use settings::{CoveringSettings, FigureSettings, LightSettings, ShopSettings, StanceSettings};
 pub use shop::{PLACES, Shop};
 pub use source::SynthSource;
 pub use tryon_geometry::camera::NoiseModel;

@@ -1,17 +1,90 @@
-//! Appearance of the synthetic actor: colours by region of the rest body.
+//! Paint of the synthetic actor: materials of its rest body.
 
+use super::actor::Appearance;
+use super::figure::FigurePaint;
+use super::figure_head::sculpt;
+use super::material::{Exposure, Material};
 use tryon_body::parts::BodySegment;
 use tryon_body::{RestBody, Template};
 use tryon_geometry::math::{P3, V3};
 
+/// Position of a joint in the rest pose, metres; the origin if there is none of that name.
+pub(super) fn rest_joint(template: &Template, rest: &RestBody, name: &str) -> V3 {
+    let at = template.skeleton().index(name);
+    at.map_or(V3::zeros(), |j| rest.joints[j].coords.cast())
+}
+
+/// 0 below `low`, 1 above `high`, smooth between.
+pub(super) fn ramp(x: f32, low: f32, high: f32) -> f32 {
+    let t = ((x - low) / (high - low)).clamp(0.0, 1.0);
+    t * t * (3.0 - 2.0 * t)
+}
+
+/// Paint of an actor.
+#[derive(Clone, Debug)]
+pub(super) enum Paint {
+    Everyday(EverydayPaint),
+    Figure(FigurePaint),
+}
+
+/// Point of a face of the rest body.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct FacePoint {
+    /// Vertices of the face.
+    pub(super) corners: [u32; 3],
+    /// Their weights.
+    pub(super) weights: [f32; 3],
+    /// Position in the rest pose, metres.
+    pub(super) rest: P3,
+}
+
+impl Paint {
+    /// Paint of an appearance; the head of a figure replaces that of `rest`.
+    pub(super) fn new(appearance: &Appearance, template: &Template, rest: &mut RestBody) -> Self {
+        match appearance {
+            Appearance::Everyday(number) => {
+                Self::Everyday(EverydayPaint::new(template, rest, Colors::pick(*number)))
+            }
+            Appearance::Figure(settings) => {
+                sculpt(template, rest, settings);
+                Self::Figure(FigurePaint::new(template, rest, settings))
+            }
+        }
+    }
+
+    /// Material at a point.
+    pub(super) fn material(&self, at: &FacePoint) -> Material {
+        match self {
+            Self::Everyday(paint) => {
+                let w = at.weights;
+                let nearest = if w[0] >= w[1] && w[0] >= w[2] {
+                    0
+                } else {
+                    1 + usize::from(w[2] > w[1])
+                };
+                paint.color(at.corners[nearest], &at.rest).into()
+            }
+            Self::Figure(paint) => paint.material(at.corners, at.weights),
+        }
+    }
+
+    /// Share of ambient light at a vertex past folds of the body.
+    pub(super) fn openness(&self, vertex: usize) -> f32 {
+        match self {
+            Self::Everyday(_) => Exposure::FULL.open,
+            Self::Figure(paint) => paint.openness[vertex],
+        }
+    }
+}
+
 /// Colours of an actor, sRGB.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct Colors {
-    pub(super) skin: [u8; 3],
-    pub(super) hair: [u8; 3],
-    pub(super) shirt: [u8; 3],
-    pub(super) legs: [u8; 3],
-    pub(super) shoes: [u8; 3],
+struct Colors {
+    skin: [u8; 3],
+    hair: [u8; 3],
+    shirt: [u8; 3],
+    legs: [u8; 3],
+    shoes: [u8; 3],
 }
 
 /// Palettes of skin, hair, shirts and leggings, sRGB.
@@ -27,7 +100,7 @@ const LEGS: [[u8; 3]; 3] = [[46, 48, 56], [54, 58, 78], [62, 54, 50]];
 
 impl Colors {
     /// Colours of a seed.
-    pub(super) fn pick(seed: u64) -> Self {
+    fn pick(seed: u64) -> Self {
         let at =
             |n: u64, len: usize| (seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) >> n) as usize % len;
         Self {
@@ -53,7 +126,7 @@ enum PaintedRegion {
 
 /// A painted template: region of each vertex and the landmarks that borders are measured from.
 #[derive(Clone, Debug)]
-pub(super) struct Paint {
+pub(super) struct EverydayPaint {
     colors: Colors,
     regions: Vec<PaintedRegion>,
     neck: V3,
@@ -73,14 +146,10 @@ const EAR: f32 = 0.074;
 /// Length of the embedded body's head from the base of the skull to the crown, metres: unit of the face below.
 const HEAD_LENGTH: f32 = 0.162;
 
-impl Paint {
-    pub(super) fn new(template: &Template, rest: &RestBody, colors: Colors) -> Self {
-        let (skeleton, weights) = (template.skeleton(), template.weights());
-        let joint = |name: &str| {
-            skeleton
-                .index(name)
-                .map_or(V3::zeros(), |j| rest.joints[j].coords.cast::<f32>())
-        };
+impl EverydayPaint {
+    fn new(template: &Template, rest: &RestBody, colors: Colors) -> Self {
+        let weights = template.weights();
+        let joint = |name: &str| rest_joint(template, rest, name);
         let parts = template.parts();
         let region = |i: usize| {
             use BodySegment::*;
@@ -119,7 +188,7 @@ impl Paint {
     }
 
     /// Colour at rest position `p`; `vertex` is one nearby.
-    pub(super) fn color(&self, vertex: u32, p: &P3) -> [u8; 3] {
+    fn color(&self, vertex: u32, p: &P3) -> [u8; 3] {
         let c = &self.colors;
         match self.regions[vertex as usize] {
             PaintedRegion::Head => self.head_color(p),

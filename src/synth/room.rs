@@ -1,5 +1,7 @@
-//! A room with a wooden floor and two walls, rendered once.
+//! A room with a wooden floor and two walls, or a studio with a seamless backdrop, rendered once.
 
+use super::backdrop::Backdrop;
+use super::settings::LightSettings;
 use tryon_geometry::camera::Intrinsics;
 use tryon_geometry::math::{Camera, P3d, Rigid, V3d, World};
 
@@ -20,6 +22,10 @@ pub struct Room {
     pub skirting: f64,
     /// A framed picture on the back wall: x from, to, y from, to, metres.
     pub picture: [f64; 4],
+    /// A seamless sheet instead of floor boards and walls of plaster.
+    pub backdrop: Option<Backdrop>,
+    /// Light on people.
+    pub light: LightSettings,
 }
 
 impl Default for Room {
@@ -32,6 +38,8 @@ impl Default for Room {
             board: 0.12,
             skirting: 0.09,
             picture: [0.75, 1.30, 1.15, 1.85],
+            backdrop: None,
+            light: LightSettings::default(),
         }
     }
 }
@@ -47,6 +55,9 @@ pub(super) struct Background {
     pub(super) floor: Vec<(u32, [f32; 2])>,
 }
 
+/// Height to which the backdrop takes the shadow of a person, metres.
+const SHADOWED: f64 = 0.2;
+
 /// Hash of a cell to [0, 1), for the texture of boards and plaster.
 fn speckle(a: i64, b: i64) -> f64 {
     let mut x = (a as u64).wrapping_mul(0x9e37_79b9_7f4a_7c15)
@@ -56,6 +67,26 @@ fn speckle(a: i64, b: i64) -> f64 {
 }
 
 impl Room {
+    /// A photographer's studio: a seamless backdrop under broad lights.
+    pub fn studio() -> Self {
+        Self {
+            back_z: -4.6,
+            left_x: f64::NEG_INFINITY,
+            backdrop: Some(Backdrop::default()),
+            light: LightSettings {
+                key: [-0.5, 0.72, 0.62],
+                fill: [0.85, 0.25, 0.45],
+                shade: [0.40, 0.12, 0.50, 0.20],
+                width: [0.35, 0.6],
+                cast: 0.42,
+                occlusion: 0.75,
+                shadow_depth: [0.0, 0.0],
+                ..LightSettings::default()
+            },
+            ..Self::default()
+        }
+    }
+
     /// Draws the room, or emptiness without one.
     pub(super) fn draw(
         room: Option<&Self>,
@@ -81,6 +112,10 @@ impl Room {
                 1.0,
             );
             let d = world_from_camera.vector(&ray);
+            if let Some(sheet) = &room.backdrop {
+                room.draw_sheet(sheet, i, &eye, &d, &mut out);
+                continue;
+            }
             // The ray has z = 1 in the camera, so its parameter is the depth.
             let hit = |distance: f64, speed: f64| {
                 let t = distance / speed;
@@ -122,6 +157,24 @@ impl Room {
             }
         }
         out
+    }
+
+    /// Pixel `i` of a backdrop, on the ray from `eye` along `d` with z = 1 in the camera.
+    fn draw_sheet(&self, sheet: &Backdrop, i: usize, eye: &P3d, d: &V3d, out: &mut Background) {
+        let Some(hit) = sheet.hit(self.back_z, eye, d) else {
+            return;
+        };
+        let p = eye + d * hit.at;
+        out.depth[i] = hit.at as f32;
+        // The shadow goes on where the sheet is still flat.
+        if p.y < SHADOWED {
+            out.floor.push((i as u32, [p.x as f32, p.z as f32]));
+        }
+        let light = sheet.light(&p, &hit.normal);
+        for (c, b) in out.color[3 * i..3 * i + 3].iter_mut().zip(sheet.color) {
+            // Dithered: a soft gradient has no bands.
+            *c = (f64::from(b) * light + speckle(i as i64, 3)).clamp(0.0, 255.0) as u8;
+        }
     }
 
     fn wall_color(&self, p: &P3d) -> [u8; 3] {

@@ -1,7 +1,9 @@
 //! Frames of a synthetic actor, with ground truth.
 
+use super::actor::Actor;
 use super::clip::{ClipError, Performance};
-use super::paint::{Colors, Paint};
+use super::grain::Grain;
+use super::paint::Paint;
 use super::posture::Posture;
 use super::room::Room;
 use super::room_view::{PaintedBody, RoomView};
@@ -9,35 +11,13 @@ use super::routine::Routine;
 use super::stance::Rig;
 use nalgebra::UnitQuaternion;
 use std::sync::Arc;
-use tryon_body::{BodyShape, BoneTransforms, Pose, RestBody, Template, skin};
+use tryon_body::{BoneTransforms, Pose, RestBody, skin};
 use tryon_formats::MotionClip;
 use tryon_geometry::camera::{
     Calibration, ColorImage, DepthImage, Intrinsics, NoiseModel, RgbdFrame,
 };
 use tryon_geometry::math::{Camera, ColorCamera, P3, P3d, Rigid, V3d, World};
 use tryon_geometry::par::Par;
-
-/// Person in front of the camera.
-#[derive(Clone, Debug)]
-pub struct Actor {
-    /// Body and joints.
-    pub template: Arc<Template>,
-    /// Shape of this person.
-    pub shape: BodyShape,
-    /// Chooses skin, hair and clothes.
-    pub appearance: u64,
-}
-
-impl Default for Actor {
-    /// The embedded body as it is.
-    fn default() -> Self {
-        Self {
-            template: tryon_body::embedded::template(),
-            shape: BodyShape::default(),
-            appearance: 0,
-        }
-    }
-}
 
 /// Colour camera at its own place and time.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -48,6 +28,24 @@ pub struct SeparateColor {
     pub color_from_depth: Rigid<ColorCamera, Camera>,
     /// Time from the exposure of depth to that of the same frame's colour, seconds.
     pub delay: f64,
+}
+
+/// Imaging of a colour camera.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ColorImaging {
+    /// Samples along each side of a pixel that sees the body: 1 has hard edges.
+    pub samples: u32,
+    /// Standard deviation of the grain, levels of 255; 0 for none.
+    pub grain: f32,
+}
+
+impl Default for ColorImaging {
+    fn default() -> Self {
+        Self {
+            samples: 1,
+            grain: 0.0,
+        }
+    }
 }
 
 /// Camera, room and routine.
@@ -73,6 +71,8 @@ pub struct Setting {
     pub rate: f64,
     /// Renders colour too.
     pub color: bool,
+    /// Edges and grain of colour.
+    pub imaging: ColorImaging,
     /// Seed of the noise.
     pub seed: u64,
 }
@@ -91,12 +91,41 @@ impl Default for Setting {
             routine: Routine::TryOn,
             rate: 30.0,
             color: true,
+            imaging: ColorImaging::default(),
             seed: 1,
         }
     }
 }
 
 impl Setting {
+    /// A studio: the depth camera of the default, with a colour camera of 1280×720 in the same place, as tall a view and
+    /// wider.
+    pub fn studio() -> Self {
+        let depth = Intrinsics::KINECT_V1;
+        let zoom = 720.0 / f64::from(depth.height);
+        let camera = Intrinsics {
+            width: 1280,
+            height: 720,
+            fx: zoom * depth.fx,
+            fy: zoom * depth.fy,
+            cx: 639.5,
+            cy: zoom * (depth.cy + 0.5) - 0.5,
+        };
+        Self {
+            color_camera: Some(SeparateColor {
+                camera,
+                color_from_depth: Rigid::identity(),
+                delay: 0.0,
+            }),
+            room: Some(Room::studio()),
+            imaging: ColorImaging {
+                samples: 2,
+                grain: 1.2,
+            },
+            ..Self::default()
+        }
+    }
+
     /// A camera `height` metres above the floor looking along −z, tilted down and then rolled (clockwise as seen
     /// from behind it), degrees.
     pub fn tilted(height: f64, down: f64, roll: f64) -> Rigid<World, Camera> {
@@ -146,6 +175,7 @@ pub struct Sequence {
     /// View and delay of a separate colour camera.
     color_view: Option<(RoomView, f64)>,
     calibration: Calibration,
+    grain: Option<Grain>,
     performance: Option<Arc<Performance>>,
 }
 
@@ -162,7 +192,8 @@ impl Sequence {
     /// Prepares everything that does not change from frame to frame.
     pub fn new(actor: Actor, setting: Setting) -> Self {
         let t = &actor.template;
-        let rest = t.personalise(&actor.shape);
+        let mut rest = t.personalise(&actor.shape);
+        let paint = Paint::new(&actor.appearance, t, &mut rest);
         let mut calibration = Calibration::registered(setting.camera);
         let color_view = setting.color_camera.map(|c| {
             calibration.color = Some(c.camera);
@@ -173,10 +204,11 @@ impl Sequence {
         });
         Self {
             rig: Rig::new(t.skeleton(), &rest),
-            paint: Paint::new(t, &rest, Colors::pick(actor.appearance)),
+            paint,
             view: room_view(&setting, setting.camera, setting.world_from_camera),
             color_view,
             calibration,
+            grain: Grain::new(setting.imaging.grain, setting.seed),
             rest,
             performance: None,
             actor,
@@ -260,7 +292,7 @@ impl Sequence {
     /// Depth of frame `i` before noise (metres along the optical axis, row-major, infinity for no surface), and its truth.
     pub fn surface_depth(&self, i: u64) -> (Vec<f32>, Truth) {
         let truth = self.truth(i);
-        let (depth, _) = self.view.draw(&self.body(&truth), false);
+        let (depth, _) = self.view.draw(&self.body(&truth), None);
         (depth, truth)
     }
 
@@ -270,15 +302,20 @@ impl Sequence {
         let Setting {
             camera,
             color,
+            imaging,
             rate,
             seed,
             ..
         } = &self.setting;
         let is_registered = self.color_view.is_none();
-        let (depth, mut pixels) = self.view.draw(&self.body(&truth), *color && is_registered);
+        let registered = (*color && is_registered).then_some(*imaging);
+        let (depth, mut pixels) = self.view.draw(&self.body(&truth), registered);
         if let Some((view, delay)) = self.color_view.as_ref().filter(|_| *color) {
             let then = self.truth_at(i as f64 / rate + delay, view.place());
-            pixels = view.draw(&self.body(&then), true).1;
+            pixels = Some(view.draw_color(&self.body(&then), *imaging));
+        }
+        if let Some((pixels, grain)) = pixels.as_mut().zip(self.grain.as_ref()) {
+            grain.add(pixels, *seed, i);
         }
         let depth: DepthImage = self.setting.noise.apply(camera, &depth, *seed, i);
         // The buffer has the size of the camera.

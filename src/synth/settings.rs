@@ -43,10 +43,40 @@ settings! {
         pub fill: [f64; 3] = [0.8, 0.2, 0.5],
         /// Shares of ambient light, light from above, key light and fill light.
         pub shade: [f32; 4] = [0.42, 0.10, 0.52, 0.14],
+        /// Width of key and fill light: the cosine at which they set is minus this. 0 is a point, 1 a wall of light.
+        pub width: [f32; 2] = [0.0, 0.0],
+        /// Share of the key light that the body keeps from itself and from the floor; 0 casts no shadows.
+        pub cast: f32 = 0.0,
+        /// Share of ambient occlusion: darkness of folds of the body that see little of the room.
+        pub occlusion: f32 = 0.0,
         /// Radius of the shadow under a foot and under the body (m).
         pub shadow: [f32; 2] = [0.16, 0.55],
         /// Darkness of these shadows in their middle.
         pub shadow_depth: [f32; 2] = [0.45, 0.30],
+    }
+
+    /// Display figure: its base layer, head and hair.
+    pub struct FigureSettings {
+        /// Skin, sRGB.
+        pub skin: [u8; 3] = [226, 187, 162],
+        /// Hair, sRGB.
+        pub hair: [u8; 3] = [74, 57, 47],
+        /// Tank top, sRGB.
+        pub top: [u8; 3] = [190, 182, 172],
+        /// Leggings, sRGB.
+        pub leggings: [u8; 3] = [116, 109, 103],
+        /// Passes of smoothing of the head: 200 leave neither nose nor ears.
+        pub smoothing: usize = 200,
+        /// Passes of smoothing between head and neck.
+        pub jaw: usize = 30,
+        /// Passes of smoothing of the body under the base layer: 12 span the navel.
+        pub span: usize = 12,
+        /// Thickness of the hair and of its knot (m).
+        pub thickness: [f32; 2] = [0.010, 0.040],
+        /// Share of light that skin scatters into its shadow, red to blue.
+        pub scatter: [f32; 3] = [0.16, 0.07, 0.04],
+        /// Gloss of skin, cloth and hair: brightness of the highlight, share of white.
+        pub gloss: [f32; 3] = [0.05, 0.0, 0.10],
     }
 
     /// Things worn that hide the shape of a body, and its stoop.

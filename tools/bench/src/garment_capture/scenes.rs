@@ -70,7 +70,7 @@ pub(super) fn shaped_actor(coefficients: &[f64], k: usize) -> Actor {
             coefficients: coefficients.to_vec(),
             ..BodyShape::default()
         },
-        appearance: k as u64,
+        appearance: (k as u64).into(),
         ..Actor::default()
     }
 }

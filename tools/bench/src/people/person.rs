@@ -57,7 +57,7 @@ impl Person {
             actor: Actor {
                 template,
                 shape,
-                appearance,
+                appearance: appearance.into(),
             },
         }
     }
