@@ -6,20 +6,20 @@ use tryon_body::{BodyShape, Template};
 
 /// Head, hair, clothes and colours of an actor.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Appearance {
+pub enum ActorAppearance {
     /// A face, short hair, T-shirt, leggings and shoes in the colours of this number.
     Everyday(u64),
     /// A figure without a face, with a smooth head, hair in a knot and a base layer of tank top and leggings.
     Figure(FigureSettings),
 }
 
-impl Default for Appearance {
+impl Default for ActorAppearance {
     fn default() -> Self {
         Self::Everyday(0)
     }
 }
 
-impl From<u64> for Appearance {
+impl From<u64> for ActorAppearance {
     fn from(number: u64) -> Self {
         Self::Everyday(number)
     }
@@ -33,7 +33,7 @@ pub struct Actor {
     /// Shape of this person.
     pub shape: BodyShape,
     /// Head, hair and clothes.
-    pub appearance: Appearance,
+    pub appearance: ActorAppearance,
 }
 
 impl Actor {
@@ -46,7 +46,7 @@ impl Actor {
         Self {
             template: tryon_body::embedded::template(),
             shape,
-            appearance: Appearance::Figure(FigureSettings::default()),
+            appearance: ActorAppearance::Figure(FigureSettings::default()),
         }
     }
 }
@@ -72,7 +72,7 @@ impl Default for Actor {
         Self {
             template: tryon_body::embedded::template(),
             shape: BodyShape::default(),
-            appearance: Appearance::default(),
+            appearance: ActorAppearance::default(),
         }
     }
 }

@@ -2,8 +2,7 @@
 
 use super::furniture::NEAR;
 use super::material::{CameraLights, Exposure};
-use super::paint::FacePoint;
-use super::room_view::PaintedBody;
+use super::paint::{FacePoint, PaintedBody};
 use super::settings::LightSettings;
 use super::shadow_map::ShadowMap;
 use tryon_geometry::camera::Intrinsics;

@@ -1,7 +1,7 @@
 //! Head of a display figure: features smoothed away, hair in a knot.
 
-use super::figure::BaseLayer;
-use super::paint::{ramp, rest_joint};
+use super::base_layer::BaseLayer;
+use super::rest_pose::{ramp, rest_joint};
 use super::settings::FigureSettings;
 use tryon_body::parts::BodySegment;
 use tryon_body::{RestBody, Template};

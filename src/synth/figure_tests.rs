@@ -3,6 +3,7 @@
 use super::*;
 use crate::{Actor, ColorImaging, NoiseModel, Sequence, Setting};
 use tryon_body::embedded;
+use tryon_geometry::math::V3;
 
 /// A figure's rest body and paint.
 fn figure() -> (RestBody, FigurePaint) {

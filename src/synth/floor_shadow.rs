@@ -1,7 +1,7 @@
 //! Soft shadow of a body on the floor under a broad light: slices of its height, each shifted along the light and blurred
 //! by the light's width, as penumbrae grow with the distance of what casts them.
 
-use super::paint::ramp;
+use super::rest_pose::ramp;
 use super::settings::LightSettings;
 use tryon_geometry::math::{Camera, P3, P3d, Rigid, V3d, World};
 

@@ -18,13 +18,14 @@
 
 mod actor;
 mod backdrop;
+mod base_layer;
 mod body_view;
 mod clip;
 mod figure;
 mod figure_head;
 mod floor_shadow;
 mod furniture;
-mod grain;
+mod imaging;
 pub mod labelled;
 mod material;
 mod paint;
@@ -32,6 +33,7 @@ mod physique;
 mod posture;
 #[cfg(test)]
 mod reoriented_tests;
+mod rest_pose;
 mod room;
 mod room_view;
 mod routine;
@@ -42,15 +44,16 @@ mod shop;
 mod source;
 mod stance;
 
-pub use actor::{Actor, Appearance};
+pub use actor::{Actor, ActorAppearance};
 pub use backdrop::Backdrop;
 pub use clip::ClipError;
 pub use furniture::{Piece, overlay};
+pub use imaging::ColorImaging;
 pub use physique::{Belly, Covering, Physique};
 pub use posture::Posture;
 pub use room::Room;
 pub use routine::Routine;
-pub use sequence::{ColorImaging, SeparateColor, Sequence, Setting, Truth};
+pub use sequence::{SeparateColor, Sequence, Setting, Truth};
 pub use settings::{CoveringSettings, FigureSettings, LightSettings, ShopSettings, StanceSettings};
 pub use shop::{PLACES, Shop};
 pub use source::SynthSource;

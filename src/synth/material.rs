@@ -5,7 +5,7 @@ use tryon_geometry::math::{Camera, Rigid, V3, V3d, World};
 
 /// Material of a point of the surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Material {
+pub(super) struct SurfaceMaterial {
     /// Colour in full light, sRGB, 0 to 255.
     pub(super) albedo: [f32; 3],
     /// Share of light that is scattered into shadow, red to blue.
@@ -14,7 +14,7 @@ pub(super) struct Material {
     pub(super) gloss: f32,
 }
 
-impl From<[u8; 3]> for Material {
+impl From<[u8; 3]> for SurfaceMaterial {
     /// A matte surface.
     fn from(color: [u8; 3]) -> Self {
         Self {
@@ -25,7 +25,7 @@ impl From<[u8; 3]> for Material {
     }
 }
 
-impl Material {
+impl SurfaceMaterial {
     /// This material and `share` of another.
     pub(super) fn mixed(&self, other: &Self, share: f32) -> Self {
         if share <= 0.0 {
@@ -102,7 +102,13 @@ impl CameraLights {
     }
 
     /// Colour of a surface with unit normal `n`, seen along the unit vector `ray`: sRGB, 0 to 255.
-    pub(super) fn color(&self, m: &Material, n: &V3, ray: &V3, exposure: Exposure) -> [f32; 3] {
+    pub(super) fn color(
+        &self,
+        m: &SurfaceMaterial,
+        n: &V3,
+        ray: &V3,
+        exposure: Exposure,
+    ) -> [f32; 3] {
         let shade = self.shade(n, exposure);
         let highlight = if m.gloss > 0.0 {
             let half = (self.key - ray).normalize();

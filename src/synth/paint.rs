@@ -1,30 +1,31 @@
 //! Paint of the synthetic actor: materials of its rest body.
 
-use super::actor::Appearance;
+use super::actor::ActorAppearance;
 use super::figure::FigurePaint;
 use super::figure_head::sculpt;
-use super::material::{Exposure, Material};
+use super::material::{Exposure, SurfaceMaterial};
+use super::rest_pose::rest_joint;
 use tryon_body::parts::BodySegment;
 use tryon_body::{RestBody, Template};
-use tryon_geometry::math::{P3, V3};
-
-/// Position of a joint in the rest pose, metres; the origin if there is none of that name.
-pub(super) fn rest_joint(template: &Template, rest: &RestBody, name: &str) -> V3 {
-    let at = template.skeleton().index(name);
-    at.map_or(V3::zeros(), |j| rest.joints[j].coords.cast())
-}
-
-/// 0 below `low`, 1 above `high`, smooth between.
-pub(super) fn ramp(x: f32, low: f32, high: f32) -> f32 {
-    let t = ((x - low) / (high - low)).clamp(0.0, 1.0);
-    t * t * (3.0 - 2.0 * t)
-}
+use tryon_geometry::math::{P3, P3d, V3};
 
 /// Paint of an actor.
 #[derive(Clone, Debug)]
 pub(super) enum Paint {
     Everyday(EverydayPaint),
     Figure(FigurePaint),
+}
+
+/// A posed body and its colours, in the frame of the camera that draws it.
+#[derive(Clone, Copy)]
+pub(super) struct PaintedBody<'a> {
+    pub(super) template: &'a Template,
+    pub(super) rest: &'a RestBody,
+    pub(super) paint: &'a Paint,
+    /// Posed joints, metres.
+    pub(super) joints: &'a [P3d],
+    /// Posed vertices, metres; empty when nobody is present.
+    pub(super) vertices: &'a [P3],
 }
 
 /// Point of a face of the rest body.
@@ -40,12 +41,16 @@ pub(super) struct FacePoint {
 
 impl Paint {
     /// Paint of an appearance; the head of a figure replaces that of `rest`.
-    pub(super) fn new(appearance: &Appearance, template: &Template, rest: &mut RestBody) -> Self {
+    pub(super) fn new(
+        appearance: &ActorAppearance,
+        template: &Template,
+        rest: &mut RestBody,
+    ) -> Self {
         match appearance {
-            Appearance::Everyday(number) => {
+            ActorAppearance::Everyday(number) => {
                 Self::Everyday(EverydayPaint::new(template, rest, Colors::pick(*number)))
             }
-            Appearance::Figure(settings) => {
+            ActorAppearance::Figure(settings) => {
                 sculpt(template, rest, settings);
                 Self::Figure(FigurePaint::new(template, rest, settings))
             }
@@ -53,7 +58,7 @@ impl Paint {
     }
 
     /// Material at a point.
-    pub(super) fn material(&self, at: &FacePoint) -> Material {
+    pub(super) fn material(&self, at: &FacePoint) -> SurfaceMaterial {
         match self {
             Self::Everyday(paint) => {
                 let w = at.weights;

@@ -3,26 +3,13 @@
 use super::body_view::{BodyRaster, Canvas, LitBody};
 use super::floor_shadow::FloorShadow;
 use super::furniture::Piece;
+use super::imaging::ColorImaging;
 use super::material::CameraLights;
-use super::paint::Paint;
+use super::paint::PaintedBody;
 use super::room::{Background, Room};
-use super::sequence::ColorImaging;
 use super::settings::LightSettings;
-use tryon_body::{RestBody, Template};
 use tryon_geometry::camera::Intrinsics;
-use tryon_geometry::math::{Camera, P3, P3d, Rigid, World};
-
-/// A posed body and its colours, in the frame of the camera that draws it.
-#[derive(Clone, Copy)]
-pub(super) struct PaintedBody<'a> {
-    pub(super) template: &'a Template,
-    pub(super) rest: &'a RestBody,
-    pub(super) paint: &'a Paint,
-    /// Posed joints, metres.
-    pub(super) joints: &'a [P3d],
-    /// Posed vertices, metres; empty when nobody is present.
-    pub(super) vertices: &'a [P3],
-}
+use tryon_geometry::math::{Camera, P3d, Rigid, World};
 
 /// A camera in a room.
 #[derive(Clone, Debug)]

@@ -2,11 +2,11 @@
 
 use super::actor::Actor;
 use super::clip::{ClipError, Performance};
-use super::grain::Grain;
-use super::paint::Paint;
+use super::imaging::{ColorGrain, ColorImaging};
+use super::paint::{Paint, PaintedBody};
 use super::posture::Posture;
 use super::room::Room;
-use super::room_view::{PaintedBody, RoomView};
+use super::room_view::RoomView;
 use super::routine::Routine;
 use super::stance::Rig;
 use nalgebra::UnitQuaternion;
@@ -28,24 +28,6 @@ pub struct SeparateColor {
     pub color_from_depth: Rigid<ColorCamera, Camera>,
     /// Time from the exposure of depth to that of the same frame's colour, seconds.
     pub delay: f64,
-}
-
-/// Imaging of a colour camera.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct ColorImaging {
-    /// Samples along each side of a pixel that sees the body: 1 has hard edges.
-    pub samples: u32,
-    /// Standard deviation of the grain, levels of 255; 0 for none.
-    pub grain: f32,
-}
-
-impl Default for ColorImaging {
-    fn default() -> Self {
-        Self {
-            samples: 1,
-            grain: 0.0,
-        }
-    }
 }
 
 /// Camera, room and routine.
@@ -175,7 +157,7 @@ pub struct Sequence {
     /// View and delay of a separate colour camera.
     color_view: Option<(RoomView, f64)>,
     calibration: Calibration,
-    grain: Option<Grain>,
+    grain: Option<ColorGrain>,
     performance: Option<Arc<Performance>>,
 }
 
@@ -208,7 +190,7 @@ impl Sequence {
             view: room_view(&setting, setting.camera, setting.world_from_camera),
             color_view,
             calibration,
-            grain: Grain::new(setting.imaging.grain, setting.seed),
+            grain: ColorGrain::new(setting.imaging.grain, setting.seed),
             rest,
             performance: None,
             actor,

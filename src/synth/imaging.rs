@@ -1,8 +1,26 @@
-//! Grain of a colour camera: normal noise of brightness with a little of hue, new in each frame.
+//! Imaging of a colour camera: samples of a pixel, and grain as normal noise of brightness with a little of hue.
 
 use rand::{Rng, SeedableRng};
 use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64Mcg;
+
+/// Imaging of a colour camera.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ColorImaging {
+    /// Samples along each side of a pixel that sees the body: 1 has hard edges.
+    pub samples: u32,
+    /// Standard deviation of the grain, levels of 255; 0 for none.
+    pub grain: f32,
+}
+
+impl Default for ColorImaging {
+    fn default() -> Self {
+        Self {
+            samples: 1,
+            grain: 0.0,
+        }
+    }
+}
 
 /// Pixels of one stretch of noise: each begins anywhere in the table.
 const STRETCH: usize = 4096;
@@ -11,11 +29,11 @@ const HUE: f64 = 0.35;
 
 /// Table of noise, interleaved channels, levels of 255.
 #[derive(Clone, Debug)]
-pub(super) struct Grain {
+pub(super) struct ColorGrain {
     table: Vec<i8>,
 }
 
-impl Grain {
+impl ColorGrain {
     /// Grain of a standard deviation (levels of 255); `None` of 0.
     pub(super) fn new(deviation: f32, seed: u64) -> Option<Self> {
         if deviation <= 0.0 {
@@ -51,7 +69,7 @@ mod tests {
 
     #[test]
     fn grain_has_its_deviation_and_is_a_function_of_the_frame() {
-        let grain = Grain::new(2.0, 5).expect("some");
+        let grain = ColorGrain::new(2.0, 5).expect("some");
         let picture = |frame: u64| {
             let mut pixels = vec![100u8; 3 * 320 * 240];
             grain.add(&mut pixels, 5, frame);
@@ -63,6 +81,6 @@ mod tests {
         let squares = first.iter().map(|p| (f64::from(*p) - 100.0).powi(2));
         let deviation = (squares.sum::<f64>() / first.len() as f64).sqrt();
         assert!((deviation - 2.13).abs() < 0.15, "{deviation}");
-        assert!(Grain::new(0.0, 5).is_none());
+        assert!(ColorGrain::new(0.0, 5).is_none());
     }
 }
