@@ -79,32 +79,43 @@ impl Default for Setting {
     }
 }
 
+/// Columns and rows of a wide colour camera.
+const WIDE: [u32; 2] = [1280, 720];
+
 impl Setting {
-    /// A studio: the depth camera of the default, with a colour camera of 1280×720 in the same place, as tall a view and
-    /// wider.
+    /// A studio with the camera of the default, soft edges and a little grain.
     pub fn studio() -> Self {
-        let depth = Intrinsics::KINECT_V1;
-        let zoom = 720.0 / f64::from(depth.height);
-        let camera = Intrinsics {
-            width: 1280,
-            height: 720,
-            fx: zoom * depth.fx,
-            fy: zoom * depth.fy,
-            cx: 639.5,
-            cy: zoom * (depth.cy + 0.5) - 0.5,
-        };
         Self {
-            color_camera: Some(SeparateColor {
-                camera,
-                color_from_depth: Rigid::identity(),
-                delay: 0.0,
-            }),
             room: Some(Room::studio()),
             imaging: ColorImaging {
                 samples: 2,
                 grain: 1.2,
             },
             ..Self::default()
+        }
+    }
+
+    /// The same setting with a colour camera of 1280×720 in the place of the depth camera, as tall a view and wider.
+    #[must_use]
+    pub fn with_wide_color(self) -> Self {
+        let depth = self.camera;
+        let zoom = f64::from(WIDE[1]) / f64::from(depth.height);
+        let camera = Intrinsics {
+            width: WIDE[0],
+            height: WIDE[1],
+            fx: zoom * depth.fx,
+            fy: zoom * depth.fy,
+            cx: 0.5 * f64::from(WIDE[0] - 1),
+            cy: zoom * (depth.cy + 0.5) - 0.5,
+        };
+        let color_camera = Some(SeparateColor {
+            camera,
+            color_from_depth: Rigid::identity(),
+            delay: 0.0,
+        });
+        Self {
+            color_camera,
+            ..self
         }
     }
 

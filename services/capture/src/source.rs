@@ -1,4 +1,4 @@
-//! Sources of a camera: `synth`, `pattern`, `push`, `ros2:…`, a device as `freenect:SERIAL`, or a recording.
+//! Sources of a camera: `studio`, `synth`, `pattern`, `push`, `ros2:…`, a device as `freenect:SERIAL`, or a recording.
 
 use crate::live::Liveness;
 use crate::pattern::Pattern;
@@ -60,7 +60,8 @@ pub fn open_with(
 ) -> Result<OpenSource, SourceError> {
     match kind(name)? {
         SourceKind::Pattern => Ok(Box::new(Pattern::new())),
-        SourceKind::Synth(routine) => Ok(synth(routine)),
+        SourceKind::Synth(setting) => Ok(synth(Actor::default(), *setting)),
+        SourceKind::Studio(setting) => Ok(synth(Actor::figure(), *setting)),
         SourceKind::Push => Err(fault(
             name,
             "runs while a program feeds it (PublishFrames)".into(),
@@ -90,9 +91,11 @@ pub(crate) fn check(config: &CameraConfig) -> Result<(), SourceError> {
     match kind(name)? {
         SourceKind::Recording(path) => recording(name, path, camera).map(drop),
         SourceKind::Device => check_device(name, camera),
-        SourceKind::Pattern | SourceKind::Push | SourceKind::Ros2(_) | SourceKind::Synth(_) => {
-            Ok(())
-        }
+        SourceKind::Pattern
+        | SourceKind::Push
+        | SourceKind::Ros2(_)
+        | SourceKind::Synth(_)
+        | SourceKind::Studio(_) => Ok(()),
     }
 }
 
@@ -118,7 +121,10 @@ fn check_device(name: &str, camera: Option<&Path>) -> Result<(), SourceError> {
 enum SourceKind<'a> {
     Pattern,
     Push,
-    Synth(Routine),
+    /// Somebody in everyday clothes in a room.
+    Synth(Box<Setting>),
+    /// The display figure in a studio.
+    Studio(Box<Setting>),
     Device,
     Ros2(ros2::Topics),
     Recording(&'a Path),
@@ -139,9 +145,11 @@ fn kind(name: &str) -> Result<SourceKind<'_>, SourceError> {
     match name.split_once(':').unwrap_or((name, "")) {
         ("pattern", _) => Ok(SourceKind::Pattern),
         _ if is_push(name) => Ok(SourceKind::Push),
-        ("synth", clip) => {
-            let routine = routine(clip).map_err(|why| fault(name, why))?;
-            Ok(SourceKind::Synth(routine))
+        ("synth", clip) => performing(name, clip, Setting::default()).map(SourceKind::Synth),
+        ("studio", clip) => performing(name, clip, Setting::studio()).map(SourceKind::Studio),
+        ("studio-720", clip) => {
+            let setting = Setting::studio().with_wide_color();
+            performing(name, clip, setting).map(SourceKind::Studio)
         }
         _ if is_device(name) => Ok(SourceKind::Device),
         _ => Ok(SourceKind::Recording(Path::new(name))),
@@ -187,16 +195,15 @@ fn routine(clip: &str) -> Result<Routine, String> {
     })
 }
 
-/// The synthetic person, without end.
-fn synth(routine: Routine) -> OpenSource {
-    let sequence = Sequence::new(
-        Actor::default(),
-        Setting {
-            routine,
-            ..Setting::default()
-        },
-    );
-    Box::new(SynthSource::new(sequence, None))
+/// A setting with the routine of a source's name.
+fn performing(name: &str, clip: &str, setting: Setting) -> Result<Box<Setting>, SourceError> {
+    let routine = routine(clip).map_err(|why| fault(name, why))?;
+    Ok(Box::new(Setting { routine, ..setting }))
+}
+
+/// A synthetic person, without end.
+fn synth(actor: Actor, setting: Setting) -> OpenSource {
+    Box::new(SynthSource::new(Sequence::new(actor, setting), None))
 }
 
 #[cfg(test)]
@@ -208,6 +215,12 @@ mod tests {
         let mut s = open("pattern").expect("always there");
         let f = s.next_frame().expect("fine").expect("never ends");
         assert_eq!(f.depth.width(), s.calibration().depth.width);
+        for (source, size) in [("studio", (640, 480)), ("studio-720:still", (1280, 720))] {
+            let mut studio = open(source).expect("always there");
+            let frame = studio.next_frame().expect("fine").expect("never ends");
+            let color = frame.color.map(|c| (c.width(), c.height()));
+            assert_eq!(color, Some(size), "{source}");
+        }
         let check = |source: &str, camera: &str| {
             check(&CameraConfig {
                 source: source.into(),
@@ -221,6 +234,8 @@ mod tests {
             "push",
             "synth",
             "synth:still",
+            "studio",
+            "studio:walk",
             "freenect:A1",
             "openni",
             "v4l2:7",
@@ -231,6 +246,7 @@ mod tests {
         assert_eq!(names.map(is_recording), [false, false, true, false]);
         for bad in [
             "synth:handstand",
+            "studio:handstand",
             "ros2:/d,",
             "/nowhere/at/all",
             "freenect:",

@@ -54,7 +54,7 @@ pub(crate) struct Cli {
 
 #[derive(Debug, Subcommand)]
 pub(crate) enum Command {
-    /// Run the whole chain in this process on a synthetic person: nothing to install, no camera, no GPU.
+    /// Run the whole chain in this process on a display figure in a studio: nothing to install, no camera, no GPU.
     ///
     /// Opens the mirror on http://127.0.0.1:8080. With --headless it needs no browser and leaves pictures and
     /// report.json in --out.
@@ -296,7 +296,7 @@ pub(crate) struct ExportArgs {
 
 #[derive(Debug, Args)]
 pub(crate) struct RecordArgs {
-    /// Source of the frames: `synth` (or `synth:leave`, `synth:walk`, `synth:still`, `synth:seated`, `synth:empty`), a recording to convert, or
+    /// Source of the frames: `studio` (a display figure), `synth` (or `synth:leave`, `synth:walk`, `synth:still`, `synth:seated`, `synth:empty`), a recording to convert, or
     /// `bus:STORE/CAMERA`, a camera that runs now.
     #[arg(long, default_value = "synth", value_name = "SOURCE")]
     pub(crate) source: String,

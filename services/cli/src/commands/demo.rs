@@ -1,4 +1,4 @@
-//! `tryon demo`: the whole chain in one process on a synthetic person.
+//! `tryon demo`: the whole chain in one process on a display figure.
 
 use crate::args::DemoArgs;
 use crate::onebox::OneBox;
