@@ -19,7 +19,15 @@ pub(crate) struct BodyDepth {
 }
 
 impl BodyDepth {
-    /// Rasterises the tracked body of `input`; returns `false` without one.
+    /// Moves the tracked body of `input` into the picture's camera. Before all that asks for its vertices.
+    pub(super) fn place(&mut self, input: &Input<'_>) {
+        let calibration = input.calibration;
+        if let (Some(body), Some(_)) = (input.body, calibration.color) {
+            (calibration.color_from_depth).points_f32(body.vertices, &mut self.moved);
+        }
+    }
+
+    /// Rasterises the placed body of `input`; returns `false` without one.
     pub(super) fn rasterise(
         &mut self,
         par: Par,
@@ -28,10 +36,6 @@ impl BodyDepth {
         area: &Area,
     ) -> bool {
         let Some(body) = input.body else { return false };
-        let calibration = input.calibration;
-        if calibration.color.is_some() {
-            (calibration.color_from_depth).points_f32(body.vertices, &mut self.moved);
-        }
         let (width, height) = (area.width.div_ceil(STEP), area.height.div_ceil(STEP));
         let view = View::Perspective {
             camera: viewport.sample_camera(area, 1).resized(width, height),
@@ -42,7 +46,7 @@ impl BodyDepth {
             cull: Cull::Back,
             ..Options::default()
         };
-        let vertices = match calibration.color {
+        let vertices = match input.calibration.color {
             Some(_) => &self.moved,
             None => body.vertices,
         };
@@ -50,7 +54,7 @@ impl BodyDepth {
         true
     }
 
-    /// Vertices of the rasterised `body` in the picture's camera.
+    /// Vertices of the placed `body` in the picture's camera.
     pub(super) fn vertices<'a>(&'a self, input: &Input<'a>, body: &BodyView<'a>) -> &'a [P3] {
         match input.calibration.color {
             Some(_) => &self.moved,

@@ -152,7 +152,8 @@ pub(crate) fn brightness(input: &Input<'_>, settings: &ExposureSettings) -> f32 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::Framing;
+    use crate::settings::FocusSettings;
+    use crate::{Framing, OutputFrame};
     use tryon_geometry::camera::{Calibration, Intrinsics, RgbdFrame};
 
     #[test]
@@ -178,9 +179,9 @@ mod tests {
                 calibration: &calibration,
                 garments: &[],
                 body: None,
-                output: Some(size),
+                output: Some(OutputFrame { size, framing }),
             };
-            let viewport = Viewport::new(&input, framing);
+            let viewport = Viewport::new(&input, None, &FocusSettings::default());
             let out = captured(Par::Seq, &input, &viewport);
             let mut tested = 0;
             for v in 0..size[1] {

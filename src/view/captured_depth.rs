@@ -84,7 +84,7 @@ impl AreaDepth {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::Framing;
+    use crate::settings::FocusSettings;
     use tryon_geometry::camera::{Calibration, ColorImage, DepthImage, Intrinsics, RgbdFrame};
     use tryon_geometry::math::Rigid;
 
@@ -109,7 +109,7 @@ mod tests {
             body: None,
             output: None,
         };
-        let viewport = Viewport::new(&input, Framing::Cover);
+        let viewport = Viewport::new(&input, None, &FocusSettings::default());
         assert_eq!(viewport.depth, [160, 120]);
         let resampled = PictureDepth::default()
             .take(&input, &viewport)

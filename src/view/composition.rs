@@ -7,11 +7,13 @@ use super::captured_pixels::CapturedPixels;
 use super::config::{Config, Model};
 use super::coverage::remove_biases;
 use super::evidence::{Evidence, PixelDepths};
+use super::focus::Focus;
 use super::grain;
 use super::hand::{ArmScene, LayerDepths, PosedLimbs};
 use super::input::{Input, RenderError};
 use super::matte::MatteInput;
 use super::off_person::{OffPerson, OffPersonInput};
+use super::own_clothes::{DressedPicture, see_face};
 use super::report::{HandReport, RenderReport};
 use super::room_light::RoomLight;
 use super::settings::{BareArmSettings, OffPersonSettings};
@@ -55,13 +57,15 @@ impl<'a> Composition<'a> {
     /// [`RenderError`] when the input cannot be drawn.
     pub(crate) fn begin(
         model: &Model,
+        state: &mut State,
         input: &Input<'a>,
         work: &mut Workspace,
     ) -> Result<Self, RenderError> {
         input.check()?;
         let clock = Instant::now();
         let config = &model.config;
-        let viewport = Viewport::new(input, config.framing);
+        state.focus = Focus::next(state.focus, input, &config.focus);
+        let viewport = Viewport::new(input, state.focus.as_ref(), &config.focus);
         let mut composition = Self {
             image: captured(config.par, input, &viewport),
             depth: work.picture_depth.take(input, &viewport)?,
@@ -76,6 +80,10 @@ impl<'a> Composition<'a> {
             viewport,
             clock,
         };
+        work.body.place(input);
+        if config.own_clothes.are_removed {
+            composition.learn_scene(config, state, input, work);
+        }
         composition.lap("captured");
         work.surface.build(input, config);
         let reach = config.lights.contact_reach * viewport.camera.fx as f32 / work.surface.distance;
@@ -100,6 +108,62 @@ impl<'a> Composition<'a> {
         }
     }
 
+    /// Learns the scene beside and behind the person.
+    fn learn_scene(&self, config: &Config, state: &mut State, input: &Input<'_>, work: &Workspace) {
+        let Some(color) = &input.frame.color else {
+            return;
+        };
+        let body = input.body.as_ref();
+        let vertices = body.map_or(&[][..], |body| work.body.vertices(input, body));
+        let (captured, sequence) = (self.captured(), input.frame.sequence);
+        (state.plate).learn(color, sequence, &captured, vertices, &config.plate);
+    }
+
+    /// Takes the own clothes beside the garments out of the captured picture.
+    fn remove_own_clothes(
+        &mut self,
+        model: &Model,
+        state: &mut State,
+        input: &Input<'_>,
+        work: &mut Workspace,
+        area: &Area,
+    ) {
+        let (Some(body), Some(_)) = (input.body, &input.frame.color) else {
+            return;
+        };
+        let (captured, vertices) = (self.captured(), work.body.vertices(input, &body));
+        if let Some(face) = see_face(&captured, &body, vertices, &model.config.own_clothes) {
+            state.face = face;
+        }
+        let full = 1.0 / (self.samples * self.samples) as f32;
+        let (pixels, alpha) = (&work.pixels, &work.matte.alpha);
+        let cover = |[u, v]: [u32; 2]| {
+            let (x, y) = (u.wrapping_sub(area.left), v.wrapping_sub(area.top));
+            if x >= area.width || y >= area.height {
+                return 0.0;
+            }
+            let i = (y * area.width + x) as usize;
+            f32::from(pixels[i].covered) * full * (1.0 - alpha[i])
+        };
+        let picture = DressedPicture {
+            config: &model.config,
+            captured,
+            vertices,
+            body,
+            plate: &state.plate,
+            face: &state.face,
+            light: state.room_light.as_ref(),
+            to_srgb: &model.to_srgb,
+        };
+        if let Some((changed, report)) = work.own_clothes.replace(&picture, cover) {
+            let data = self.image.data_mut();
+            for (i, color) in changed {
+                data[3 * i..3 * i + 3].copy_from_slice(&color);
+            }
+            self.report.own_clothes = Some(report);
+        }
+    }
+
     /// Draws the tracked body into `work.body`, and measures light of the room and grain if that is due. Before all that
     /// depends on either.
     pub(crate) fn see_body(
@@ -114,6 +178,7 @@ impl<'a> Composition<'a> {
         self.is_tracked = (work.body).rasterise(config.par, input, &self.viewport, area);
         if self.is_tracked {
             self.measure_room(config, state, input, work);
+            self.report.light = state.room_light;
         }
         self.lap("body");
     }
@@ -149,6 +214,10 @@ impl<'a> Composition<'a> {
             depth: &depth.metres,
         });
         self.lap("visibility");
+        if is_tracked && config.own_clothes.are_removed {
+            self.remove_own_clothes(model, state, input, work, area);
+            self.lap("own clothes");
+        }
         let full = 1.0 / (self.samples * self.samples) as f32;
         let pixels = work.pixels.iter();
         let covered = pixels.map(|p| [f32::from(p.covered) * full, p.depth]);
@@ -180,7 +249,7 @@ impl<'a> Composition<'a> {
         }
         let captured = self.captured();
         let vertices = work.body.vertices(input, &body);
-        let light = RoomLight::measure(&captured, &body, vertices, settings);
+        let light = RoomLight::measure(&captured, &body, vertices, config);
         let has_reading = |u, v| captured.metres(u, v) > 0.0;
         let grain = grain::measure(&self.image, has_reading, &config.grain);
         state.take_room(light, grain, time_ns, settings);

@@ -1,23 +1,12 @@
 //! Settings of the compositor; immutable while a session runs.
 
 use super::settings::{
-    BareArmSettings, ExposureSettings, GrainSettings, MatteSettings, OffPersonSettings,
-    RoomLightSettings,
+    BareArmSettings, ExposureSettings, FocusSettings, GrainSettings, MatteSettings,
+    OffPersonSettings, OwnClothesSettings, PlateSettings, RoomLevelSettings, RoomLightSettings,
 };
 use super::srgb::ToSrgb;
-use serde::{Deserialize, Serialize};
 use tryon_geometry::par::Par;
 use tryon_geometry::settings;
-
-/// Fit of the captured picture into an output of another aspect ratio. Proportions are always kept.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Default, Serialize, Deserialize)]
-pub enum Framing {
-    /// Fill the output, cropping what does not fit, about the centre.
-    #[default]
-    Cover,
-    /// Show everything, black beside it.
-    Contain,
-}
 
 settings! {
     /// Light in the room, in units in which a white wall facing the camera comes out as about 0.9.
@@ -83,8 +72,8 @@ pub struct Config {
     pub margins: Margins,
     /// Light on the garments.
     pub lights: Lights,
-    /// Fit of the captured picture into the output.
-    pub framing: Framing,
+    /// Part of the captured picture that a cropped one shows.
+    pub focus: FocusSettings,
     /// Depth bias of each garment over the one inside it, metres: layers a millimetre apart show through each other
     /// below it. Only for the depth test among garments (docs/decisions, depth biases).
     pub layer_bias: f32,
@@ -100,8 +89,10 @@ pub struct Config {
     /// Seconds of the capture clock between two measurements of garments off the person
     /// ([`RenderReport::off_person`](super::RenderReport::off_person)); 0 = every picture, infinity = never.
     pub off_person_interval: f64,
-    /// Brightness of the room.
+    /// Brightness of the room while nobody is tracked, or too little surrounds the person.
     pub exposure: ExposureSettings,
+    /// Mean light of the room.
+    pub room_level: RoomLevelSettings,
     /// Light of the room.
     pub room_light: RoomLightSettings,
     /// Grain of the camera.
@@ -112,6 +103,10 @@ pub struct Config {
     pub bare_arms: BareArmSettings,
     /// Garments off the person.
     pub off_person: OffPersonSettings,
+    /// The scene without the person.
+    pub plate: PlateSettings,
+    /// Own clothes that disappear.
+    pub own_clothes: OwnClothesSettings,
 }
 
 impl Config {
@@ -128,18 +123,21 @@ impl Default for Config {
             samples: 3,
             margins: Margins::default(),
             lights: Lights::default(),
-            framing: Framing::Cover,
+            focus: FocusSettings::default(),
             layer_bias: 15e-3,
             inner_bias: 10e-3,
             skip_hidden: true,
             skip_unseen: true,
             off_person_interval: 0.2,
             exposure: ExposureSettings::default(),
+            room_level: RoomLevelSettings::default(),
             room_light: RoomLightSettings::default(),
             grain: GrainSettings::default(),
             matte: MatteSettings::default(),
             bare_arms: BareArmSettings::default(),
             off_person: OffPersonSettings::default(),
+            plate: PlateSettings::default(),
+            own_clothes: OwnClothesSettings::default(),
         }
     }
 }

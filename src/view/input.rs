@@ -46,8 +46,27 @@ pub struct Input<'a> {
     pub garments: &'a [GarmentView<'a>],
     /// Tracked body, if there is one.
     pub body: Option<BodyView<'a>>,
-    /// Size of the picture; `None` = the size of the colour image.
-    pub output: Option<[u32; 2]>,
+    /// Shape of the picture; `None` = the colour image's.
+    pub output: Option<OutputFrame>,
+}
+
+/// Fit of the captured picture into one of another aspect ratio. Proportions are always kept.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Default)]
+pub enum Framing {
+    /// Show everything, black beside it.
+    #[default]
+    Contain,
+    /// Fill the picture, cropping what does not fit; the crop follows the tracked person.
+    Cover,
+}
+
+/// Shape of a picture.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub struct OutputFrame {
+    /// Columns and rows, pixels.
+    pub size: [u32; 2],
+    /// Fit of the captured picture.
+    pub framing: Framing,
 }
 
 /// Input that cannot be drawn.
@@ -105,12 +124,13 @@ const MAX_SIDE: u32 = 8192;
 impl Input<'_> {
     /// Size of the picture.
     pub fn output_size(&self) -> [u32; 2] {
-        self.output
-            .unwrap_or_else(|| match (&self.frame.color, &self.calibration.color) {
+        self.output.map(|o| o.size).unwrap_or_else(|| {
+            match (&self.frame.color, &self.calibration.color) {
                 (Some(c), _) => [c.width(), c.height()],
                 (None, Some(k)) => [k.width, k.height],
                 (None, None) => [self.frame.depth.width(), self.frame.depth.height()],
-            })
+            }
+        })
     }
 
     /// Checks everything a renderer relies on.

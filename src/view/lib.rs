@@ -47,12 +47,14 @@
 //! - Captured pixels, then garments: [`mod@captured`], [`mod@blend`].
 //! - Garment or person in front, with and without a depth reading: [`mod@evidence`].
 //! - Patches that hide cloth: [`mod@occluder`].
+//! - Own clothes that disappear, and the scene behind: [`mod@own_clothes`].
+//! - Crops that follow the person: [`mod@focus`].
 //! - Soft edges: [`mod@matte`].
 //! - Depth moved to the colour camera: [`mod@captured_depth`].
 //! - Garments beside the recorded person: [`mod@off_person`], [`mod@silhouette_grid`].
 //! - Bare hands by colour: [`mod@hand::detect`].
 //! - Light: [`mod@shading`], [`mod@contact_shadow`].
-//! - Light of the room, from the captured person: [`mod@room_light`]. Grain of the camera: [`mod@grain`].
+//! - Light of the room, from the captured person: [`mod@room_light`], its level: [`mod@room_level`]. Grain of the camera: [`mod@grain`].
 //! - Fabric colour and prints: [`mod@appearance`]. Yarns and surface: [`mod@cloth_tile`]; both: [`mod@cloth`].
 //! - Seams, hems, ribs: [`mod@construction`], [`mod@edge_profile`].
 //! - Images on fabric: [`mod@image_pyramid`].
@@ -77,6 +79,7 @@ pub(crate) mod contact_shadow;
 pub(crate) mod coverage;
 mod edge_profile;
 mod evidence;
+mod focus;
 #[cfg(feature = "gpu")]
 pub mod gpu;
 mod grain;
@@ -87,8 +90,10 @@ mod limbs;
 mod matte;
 mod occluder;
 mod off_person;
+mod own_clothes;
 mod render;
 mod report;
+mod room_level;
 mod room_light;
 mod settings;
 pub(crate) mod shading;
@@ -105,18 +110,20 @@ mod workspace;
 
 pub use appearance::{Appearance, Print};
 pub use cloth::ShadedCloth;
-pub use config::{Config, Framing, Lights, Margins, Model};
+pub use config::{Config, Lights, Margins, Model};
 pub use construction::{EdgePlace, edge_places};
 pub use image_pyramid::ImagePyramid;
-pub use input::{BodyView, GarmentView, Input, RenderError};
+pub use input::{BodyView, Framing, GarmentView, Input, OutputFrame, RenderError};
 pub use limbs::Limbs;
 pub use off_person::OffPerson;
+pub use own_clothes::OwnClothesReport;
 pub use render::render;
 pub use report::{HandReport, RenderReport};
 pub use room_light::RoomLight;
 pub use settings::{
-    BareArmSettings, ExposureSettings, GrainSettings, LimbSettings, MatteSettings,
-    OffPersonSettings, RoomLightSettings, SkinSettings,
+    BareArmSettings, ExposureSettings, FocusSettings, GrainSettings, LimbSettings, MatteSettings,
+    OffPersonSettings, OwnClothesSettings, PlateSettings, RoomLevelSettings, RoomLightSettings,
+    SkinSettings,
 };
 pub use state::State;
 pub use workspace::Workspace;

@@ -16,6 +16,8 @@ pub struct Limbs {
     pub(super) trunk: Vec<u32>,
     /// Part of each vertex, shape `[vertices]`.
     pub(super) parts: Vec<BodyPart>,
+    /// Segment of each vertex, shape `[vertices]`.
+    pub(super) segments: Vec<BodySegment>,
 }
 
 /// Vertices of one arm.
@@ -36,6 +38,9 @@ impl Limbs {
         let mut out = Self {
             parts: (0..vertices)
                 .map(|v| parts.part(weights.dominant(v)))
+                .collect(),
+            segments: (0..vertices)
+                .map(|v| parts.segment(weights.dominant(v)))
                 .collect(),
             ..Self::default()
         };

@@ -23,7 +23,7 @@ pub fn render(
 ) -> Result<(ColorImage, RenderReport), RenderError> {
     let config = &model.config;
     state.keep_if(input.body.is_some());
-    let mut picture = Composition::begin(model, input, work)?;
+    let mut picture = Composition::begin(model, state, input, work)?;
     let Some(area) = picture.area else {
         return Ok(picture.end(work));
     };

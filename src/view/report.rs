@@ -1,6 +1,8 @@
 //! Cost of a picture, work left out, and its measured fault.
 
 use super::off_person::OffPerson;
+use super::own_clothes::OwnClothesReport;
+use super::room_light::RoomLight;
 
 /// Outcome of the detection of bare hands.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -36,10 +38,14 @@ pub struct RenderReport {
     pub specks_dropped: usize,
     /// Bare hands and forearms found in front by colour.
     pub hands: HandReport,
+    /// Own clothes beside garments that take their place; `None` where none are told.
+    pub own_clothes: Option<OwnClothesReport>,
     /// Garments off the person; `None` in pictures between two measurements, and where too little is seen to measure.
     pub off_person: Option<OffPerson>,
-    /// Estimated brightness of the captured picture; 1 = a well exposed room.
+    /// Brightness of the captured picture by its bright parts alone; 1 = a well exposed room.
     pub brightness: f32,
+    /// Light on the garments; `None` while it is not known.
+    pub light: Option<RoomLight>,
     /// Milliseconds by stage, in order.
     pub stages_ms: Vec<(&'static str, f32)>,
 }

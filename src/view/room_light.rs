@@ -4,8 +4,11 @@
 //! body has an albedo of its own; one k for each channel explains them all.
 
 use super::captured_pixels::CapturedPixels;
+use super::config::Config;
 use super::input::BodyView;
+use super::room_level;
 use super::settings::RoomLightSettings;
+use super::shading::lit;
 use super::srgb::linear;
 use nalgebra::{Matrix4, Vector4};
 use serde::{Deserialize, Serialize};
@@ -19,9 +22,12 @@ const LEAST_MEAN: f32 = 0.2;
 /// Rounds of albedo and light in turns, each with new weights.
 const ROUNDS: usize = 8;
 
-/// Light of a room by channel, over its mean: 1 + slope·n on a surface of normal n (picture's camera).
+/// Light of a room by channel: the mean, times 1 + slope·n on a surface of normal n (picture's camera).
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct RoomLight {
+    /// Light on a white surface towards the camera, 1 = it comes out white; `None` where too little surrounds the person.
+    #[serde(default)]
+    pub level: Option<[f32; 3]>,
     /// Change with the normal over the mean, for red, green and blue: each vector points to where that colour comes from.
     pub slope: [[f32; 3]; 3],
 }
@@ -41,10 +47,12 @@ impl RoomLight {
         captured: &CapturedPixels<'_>,
         body: &BodyView<'_>,
         vertices: &[P3],
-        settings: &RoomLightSettings,
+        config: &Config,
     ) -> Option<Self> {
-        let patches = patches(captured, body, vertices, settings);
-        Self::fit(&patches, settings)
+        let patches = patches(captured, body, vertices, &config.room_light);
+        let level = room_level::measure(captured, vertices, &body.limbs.face, &config.room_level);
+        let light = Self::fit(&patches, &config.room_light)?;
+        Some(Self { level, ..light })
     }
 
     fn fit(patches: &[LitPatch], settings: &RoomLightSettings) -> Option<Self> {
@@ -56,17 +64,24 @@ impl RoomLight {
         let mean = (slope[0] + slope[1] + slope[2]) / 3.0;
         let slope = slope.map(|s| (mean + (s - mean) * settings.tint).into());
         let is_finite = slope.iter().flatten().all(|v: &f32| v.is_finite());
-        is_finite.then_some(Self { slope })
+        is_finite.then_some(Self { level: None, slope })
+    }
+
+    /// Light on a surface of normal `n` over the mean, by channel.
+    pub(crate) fn relative(&self, n: &V3) -> [f32; 3] {
+        self.slope.map(|k| lit(1.0 + V3::from(k).dot(n)))
     }
 
     /// This light after `seconds` of another.
     pub(crate) fn toward(&self, other: &Self, seconds: f32, settings: &RoomLightSettings) -> Self {
         let share = settings.share(seconds);
+        let mix = |a: [f32; 3], b: [f32; 3]| [0, 1, 2].map(|k| a[k] + (b[k] - a[k]) * share);
         Self {
-            slope: [0, 1, 2].map(|c| {
-                let (a, b) = (self.slope[c], other.slope[c]);
-                [0, 1, 2].map(|k| a[k] + (b[k] - a[k]) * share)
-            }),
+            level: match (self.level, other.level) {
+                (Some(a), Some(b)) => Some(mix(a, b)),
+                (old, new) => new.or(old),
+            },
+            slope: [0, 1, 2].map(|c| mix(self.slope[c], other.slope[c])),
         }
     }
 }
@@ -212,10 +227,15 @@ mod tests {
         let settings = RoomLightSettings::default();
         assert_eq!(RoomLight::fit(&lit(V3::x())[..10], &settings), None);
         let [from, to] = [0.0, 0.5].map(|x| RoomLight {
+            level: Some([x; 3]),
             slope: [[x, 0.0, 0.0]; 3],
         });
         let after = from.toward(&to, settings.memory, &settings);
         assert!((after.slope[0][0] - 0.5 * (1.0 - (-1f32).exp())).abs() < 1e-6);
+        assert_eq!(after.level, Some([after.slope[0][0]; 3]));
         assert_eq!(from.toward(&to, 0.0, &settings), from);
+        let unknown = RoomLight { level: None, ..to };
+        assert_eq!(from.toward(&unknown, 9.0, &settings).level, from.level);
+        assert_eq!(unknown.toward(&from, 9.0, &settings).level, from.level);
     }
 }

@@ -43,6 +43,78 @@ settings! {
         pub least_light: f32 = 0.05,
     }
 
+    /// Settings of the part of the captured picture that a cropped one shows.
+    pub struct FocusSettings {
+        /// Distance from the focus within which a person moves no picture, share of its side.
+        pub rest: f64 = 0.05,
+        /// Distance at which a moving picture has arrived, share of its side.
+        pub arrived: f64 = 0.005,
+        /// Time constant of the movement, seconds: less swings, more loses who walks.
+        pub glide: f64 = 0.4,
+        /// Place of the middle of the body and of the top of the head in the picture, shares of its sides.
+        pub place: [f64; 2] = [0.5, 0.12],
+    }
+
+    /// Settings of the scene without the person.
+    pub struct PlateSettings {
+        /// Distance around the person in which nothing is learned of what is not behind it, metres: own clothes, hair, bags.
+        pub margin: f32 = 0.25,
+        /// Distance behind the farthest of the person beyond which something is the scene, metres.
+        pub behind: f32 = 0.3,
+    }
+
+    /// Settings of own clothes that disappear.
+    pub struct OwnClothesSettings {
+        /// Own clothes are taken away; otherwise they stay as captured.
+        pub are_removed: bool = true,
+        /// Share of a half of the person that garments cover when they take the place of the own clothes there.
+        pub covered: f32 = 0.6,
+        /// Distance of a reading from the tracked skin within which it tells the colour of own clothes, metres.
+        pub on_body: f32 = 0.06,
+        /// Distance in depth within which a pixel beside the body is the person, metres.
+        pub off_body: f32 = 0.25,
+        /// Reach of own clothes off the tracked body across the picture, metres: loose sleeves.
+        pub reach: f32 = 0.1,
+        /// Radius about the head in which hair may fall over clothes, metres.
+        pub head: f32 = 0.2,
+        /// Share of the clothes' colours below which hair falls over them; above it clothes have its colour.
+        pub hair_over: f32 = 0.4,
+        /// Share of the hair that looks like clothes above which nothing near the head is changed.
+        pub like_hair: f32 = 0.2,
+        /// Tones of clothes looked at, at most.
+        pub most_tones: usize = 400,
+        /// Share of the clothes that looks like skin above which nothing can be told apart.
+        pub mixed: f32 = 0.3,
+        /// Skin against clothes by colour.
+        pub colors: SkinSettings = SkinSettings { unknown_clothes: -12.0, ..SkinSettings::default() },
+    }
+
+    /// Settings of the mean light of the room.
+    pub struct RoomLevelSettings {
+        /// Columns of the picture looked at.
+        pub columns: u32 = 80,
+        /// Fewest pixels beside the person of which a light is told.
+        pub least: usize = 250,
+        /// Distance around the person that is left out: own clothes, what is held (metres).
+        pub margin: f32 = 0.15,
+        /// Distance of a reading from the tracked face within which it is seen, metres.
+        pub on_face: f32 = 0.05,
+        /// Percentiles of brightness between which pixels are paint: their mean colour is the light's.
+        pub brighter: f32 = 0.4,
+        /// See `brighter`; the upper one is as bright as `paint`.
+        pub paint_percentile: f32 = 0.85,
+        /// Reflectance of a light wall: white paint 0.8, grey and wood 0.4.
+        pub paint: f32 = 0.6,
+        /// Least and greatest reflectance of skin (0.05 in the darkest, 0.45 in the fairest).
+        pub skin: [f32; 2] = [0.05, 0.45],
+        /// Share of the paint's colour that is believed to be the light's: cameras balance the greater part away.
+        pub tint: f32 = 0.5,
+        /// Least and greatest channel over the mean.
+        pub tints: [f32; 2] = [0.8, 1.25],
+        /// Least and greatest light: cameras expose.
+        pub range: [f32; 2] = [0.2, 1.1],
+    }
+
     /// Settings of the camera's grain.
     pub struct GrainSettings {
         /// Columns and rows between two looked at.

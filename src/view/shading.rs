@@ -29,6 +29,12 @@ const FUZZ_HIDES: f32 = 0.5;
 const FUZZ_WHITE: f32 = 0.15;
 const FUZZ_DYED: f32 = 0.5;
 
+/// Linear light with a smooth end: no side is without any.
+#[inline]
+pub(crate) fn lit(e: f32) -> f32 {
+    0.5 * (e + (e * e + LEAST_LIGHT).sqrt())
+}
+
 /// Direction of a vector; zero for zero.
 #[inline]
 fn unit(v: V3) -> V3 {
@@ -48,7 +54,8 @@ pub(crate) struct Shader<'a> {
     /// Mean light, and its change with the normal over the mean by channel, where the room's light is known.
     level: f32,
     room: Option<[V3; 3]>,
-    pub(crate) brightness: f32,
+    /// Light of this picture over that of `lights`, by channel.
+    pub(crate) brightness: [f32; 3],
 }
 
 /// The last shaded face, which neighbours mostly share; barycentric coordinates are `ray · gradient`.
@@ -90,6 +97,7 @@ impl<'a> Shader<'a> {
         let slopes = room.map(|r| r.slope.map(V3::from));
         let mean: Option<V3> = slopes.map(|s| (s[0] + s[1] + s[2]) / 3.0);
         let key = mean.and_then(|m| m.try_normalize(MIN_SLOPE));
+        let level = 0.5 * (lights.sky + lights.ground) + lights.key * WRAP / (1.0 + WRAP);
         Self {
             surface,
             camera,
@@ -98,9 +106,15 @@ impl<'a> Shader<'a> {
             up: direction(lights.up),
             key: key.unwrap_or_else(|| direction(lights.key_direction)),
             lamp: mean.map_or(lights.key, |m| lights.key * m.norm().min(1.0)),
-            level: 0.5 * (lights.sky + lights.ground) + lights.key * WRAP / (1.0 + WRAP),
+            level,
             room: slopes,
-            brightness,
+            brightness: match room.and_then(|r| r.level.zip(slopes)) {
+                // The level is that of a surface towards the camera.
+                Some((seen, slopes)) => {
+                    [0, 1, 2].map(|c| seen[c] / (level * lit(1.0 - slopes[c].z)))
+                }
+                None => [brightness; 3],
+            },
         }
     }
 
@@ -168,11 +182,11 @@ impl<'a> Shader<'a> {
         let albedo = fabric.albedo([tu, tv], footprint);
 
         let side = if is_inner { self.lights.inside } else { 1.0 };
-        let gain = self.brightness * side * (1.0 - shadow);
+        let gain = self.brightness.map(|b| b * side * (1.0 - shadow));
         let Some(cloth) = &fabric.cloth else {
-            let diffuse = self.diffuse(&n, open) * gain;
-            let sheen = self.sheen(&n, &eye, fabric.gloss) * gain;
-            return albedo.map(|a| self.to_srgb.get(a * diffuse + sheen));
+            let diffuse = self.diffuse(&n, open);
+            let sheen = self.sheen(&n, &eye, fabric.gloss);
+            return [0, 1, 2].map(|c| self.to_srgb.get((albedo[c] * diffuse + sheen) * gain[c]));
         };
         let place = EdgePlace {
             free,
@@ -193,9 +207,8 @@ impl<'a> Shader<'a> {
             eye,
             open,
         };
-        light
-            .reflected(cloth, relief.variance, albedo)
-            .map(|c| self.to_srgb.get(c * gain))
+        let reflected = light.reflected(cloth, relief.variance, albedo);
+        [0, 1, 2].map(|c| self.to_srgb.get(reflected[c] * gain[c]))
     }
 
     /// Light on a surface by channel; `open` is the share of it that reaches the surface.
@@ -204,12 +217,7 @@ impl<'a> Shader<'a> {
         let Some(room) = &self.room else {
             return [self.diffuse(n, open); 3];
         };
-        room.map(|slope| {
-            let e = 1.0 + slope.dot(n);
-            // No side is without any light; a smooth end of the linear law.
-            let lit = 0.5 * (e + (e * e + LEAST_LIGHT).sqrt());
-            self.level * lit * open
-        })
+        room.map(|slope| self.level * lit(1.0 + slope.dot(n)) * open)
     }
 
     /// Hemisphere light and wrapped key light; `open` is the share of ambient light that reaches the surface.

@@ -138,6 +138,15 @@ impl SkinClassifier {
     }
 }
 
+impl SkinClassifier {
+    /// A kind of the clothes is the most likely class of this tone.
+    #[inline]
+    pub(super) fn is_clothes(&self, c: &[f32; 3]) -> bool {
+        let other = self.skin.log_density(c).max(self.unknown_clothes);
+        self.clothes.iter().any(|k| k.log_density(c) > other)
+    }
+}
+
 /// Tones of a component below which it is a speck, or a finger in an unexpected place.
 const SPECK: usize = 8;
 

@@ -1,7 +1,9 @@
 //! Memory between pictures: colours of one user's skin and clothes, light of the room, grain of the camera, times of the last
 //! measurements.
 
+use super::focus::Focus;
 use super::grain::Grain;
+use super::own_clothes::Plate;
 use super::room_light::RoomLight;
 use super::settings::{RoomLightSettings, SkinSettings};
 use super::skin::{MIN_TONES, SkinClassifier, tone};
@@ -19,6 +21,15 @@ pub struct State {
     /// Capture time of the last measurement of garments off the person, nanoseconds; `None` = never.
     #[serde(default)]
     off_person_ns: Option<u64>,
+    /// Place of the person, which crops follow.
+    #[serde(default)]
+    pub(super) focus: Option<Focus>,
+    /// The scene without the person. A picture of somebody's room goes nowhere.
+    #[serde(skip)]
+    pub(super) plate: Plate,
+    /// Colours of the face as last seen: who turns around has the same skin.
+    #[serde(default)]
+    pub(super) face: Vec<[u8; 3]>,
     /// Light of the room.
     #[serde(default)]
     pub(super) room_light: Option<RoomLight>,
@@ -50,6 +61,8 @@ impl State {
         if !tracked && self.pictures > 0 {
             *self = Self {
                 off_person_ns: self.off_person_ns,
+                focus: self.focus,
+                plate: std::mem::take(&mut self.plate),
                 room_light: self.room_light,
                 grain: self.grain,
                 room_ns: self.room_ns,

@@ -1,8 +1,9 @@
 //! Camera of the output picture and its mapping to the captured images.
 
 use super::area::Area;
-use super::config::Framing;
-use super::input::Input;
+use super::focus::Focus;
+use super::input::{Framing, Input};
+use super::settings::FocusSettings;
 use tryon_geometry::camera::Intrinsics;
 
 /// Camera of the output picture and its mapping to the captured images.
@@ -21,8 +22,9 @@ pub(crate) struct Viewport {
 }
 
 impl Viewport {
-    /// The viewport of `input.output_size()`, seen from the colour camera if there is a separate one.
-    pub(crate) fn new(input: &Input<'_>, framing: Framing) -> Self {
+    /// The viewport of `input.output_size()`, seen from the colour camera if there is a separate one. A crop shows the focus,
+    /// or the middle without one.
+    pub(crate) fn new(input: &Input<'_>, focus: Option<&Focus>, settings: &FocusSettings) -> Self {
         let [width, height] = input.output_size();
         let depth = [input.frame.depth.width(), input.frame.depth.height()];
         let base = input.calibration.color.unwrap_or(input.calibration.depth);
@@ -33,12 +35,20 @@ impl Viewport {
             .map_or([base.width, base.height], |c| [c.width(), c.height()]);
         let base = base.resized(color[0], color[1]);
         let ratio = [0, 1].map(|k| f64::from([width, height][k]) / f64::from(color[k]));
-        let scale = match framing {
+        let scale = match input.output.map_or(Framing::Contain, |o| o.framing) {
             Framing::Cover => ratio[0].max(ratio[1]),
             Framing::Contain => ratio[0].min(ratio[1]),
         };
-        let shift =
-            [0, 1].map(|k| (f64::from([width, height][k]) - scale * f64::from(color[k])) * 0.5);
+        let shift = [0, 1].map(|k| {
+            let (out, whole) = (f64::from([width, height][k]), scale * f64::from(color[k]));
+            match focus {
+                // Never past the captured picture.
+                Some(focus) if whole > out => {
+                    (settings.place[k] * out - focus.at[k] * whole).clamp(out - whole, 0.0)
+                }
+                _ => (out - whole) * 0.5,
+            }
+        });
         let camera = Intrinsics {
             width,
             height,

@@ -6,6 +6,7 @@ use super::contact_shadow::ContactShadows;
 use super::coverage::PixelCoverage;
 use super::hand::HandDetector;
 use super::matte::Matte;
+use super::own_clothes::OwnClothes;
 use super::surface::Surface;
 
 /// Scratch of [`render`](super::render()); dropping it changes no picture.
@@ -19,4 +20,5 @@ pub struct Workspace {
     pub(crate) shadows: ContactShadows,
     pub(super) body: BodyDepth,
     pub(super) hands: HandDetector,
+    pub(super) own_clothes: OwnClothes,
 }

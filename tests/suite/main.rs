@@ -19,6 +19,7 @@ mod offline_steps;
 mod on_person;
 mod others;
 mod returning;
+mod room_light;
 mod seat;
 mod size;
 mod sleep;

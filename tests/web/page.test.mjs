@@ -9,9 +9,10 @@ import { offWords } from '../../services/compositor/web/js/details.js';
 import { failureWords, progressWords } from '../../services/compositor/web/js/fine_picture.js';
 import { fitRows, fitWords } from '../../services/compositor/web/js/fit.js';
 import { Code, RpcError } from '../../services/compositor/web/js/grpc_web.js';
-import { Codec, End, Reason, State } from '../../services/compositor/web/js/messages.js';
+import { Codec, End, Framing, Reason, State } from '../../services/compositor/web/js/messages.js';
 import { Outfit } from '../../services/compositor/web/js/outfit.js';
 import { BLANK_MS, STALE_MS, ageWords, present } from '../../services/compositor/web/js/presentation.js';
+import { pictureShape } from '../../services/compositor/web/js/shape.js';
 import { Stats, percentile } from '../../services/compositor/web/js/stats.js';
 import { TryOn, drawId } from '../../services/compositor/web/js/try_on.js';
 
@@ -246,6 +247,30 @@ test('every message is acknowledged, and a lost acknowledgement ends nothing', a
   assert.deepEqual(script.calls.acknowledged, [[7n, 1n], [7n, 2n]]);
   assert.deepEqual(links(events), ['opening']);
   await tryOn.close();
+});
+
+test('another shape streams again without opening again', async () => {
+  const asked = [];
+  const script = scripted({ streams: [] });
+  script.client.streamFrames = async function* (request, { signal }) {
+    asked.push(request.width);
+    yield status(State.LIVE);
+    await forever(signal);
+  };
+  let width = 540;
+  const { tryOn, events, until } = follow(script, { shape: () => ({ width, height: 960 }), silenceMs: 5000 });
+  await until((e) => e.filter((x) => x.kind === 'status').length === 1);
+  width = 720;
+  tryOn.reshape();
+  await until((e) => e.filter((x) => x.kind === 'status').length === 2);
+  assert.deepEqual([asked, links(events), script.calls.open], [[540, 720], ['opening'], 1]);
+  await tryOn.close();
+});
+
+test('an upright glass asks for upright pictures of at most 960 rows', () => {
+  assert.deepEqual(pictureShape(1080, 1920), { width: 540, height: 960, framing: Framing.COVER });
+  assert.deepEqual(pictureShape(301, 400), { width: 302, height: 400, framing: Framing.COVER });
+  for (const glass of [[1920, 1080], [800, 800], [0, 0], [NaN, 5]]) assert.deepEqual(pictureShape(...glass), {});
 });
 
 test('silence is a broken line', async () => {

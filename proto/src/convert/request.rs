@@ -65,6 +65,8 @@ pub fn choices(
 pub struct PictureFormat {
     /// Pixels; `None` means the camera's size.
     pub size: Option<(u32, u32)>,
+    /// Fills `size`, cropped around the person; otherwise everything is shown, black beside it.
+    pub is_cropped: bool,
     /// JPEG quality, 1 to 100.
     pub quality: u8,
     /// Time between two pictures; zero means no limit.
@@ -99,6 +101,11 @@ pub fn picture_format(r: &v1::StreamFramesRequest) -> Result<PictureFormat, Wire
     if r.quality > 100 {
         return fault("quality", "1 to 100, or 0 for the default");
     }
+    let is_cropped = match v1::PictureFraming::try_from(r.framing) {
+        Ok(v1::PictureFraming::Unspecified | v1::PictureFraming::Contain) => false,
+        Ok(v1::PictureFraming::Cover) => true,
+        Err(_) => return fault("framing", "CONTAIN or COVER"),
+    };
     let interval = match r.max_rate {
         0.0 => Duration::ZERO,
         rate if RATES.contains(&rate) => Duration::from_secs_f32(1.0 / rate),
@@ -117,6 +124,7 @@ pub fn picture_format(r: &v1::StreamFramesRequest) -> Result<PictureFormat, Wire
     Ok(PictureFormat {
         window,
         size,
+        is_cropped,
         quality: if r.quality == 0 { 80 } else { r.quality as u8 },
         interval,
     })

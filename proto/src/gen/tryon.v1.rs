@@ -3785,8 +3785,7 @@ pub struct ListGarmentChoicesResponse {
 pub struct StreamFramesRequest {
     #[prost(string, tag = "1")]
     pub try_on_id: ::prost::alloc::string::String,
-    /// Size of the pictures, pixels, 16 to 4096 each; both 0 means the camera's size. Another aspect ratio is
-    /// letterboxed.
+    /// Size of the pictures, pixels, 16 to 4096 each; both 0 means the camera's size. `framing` fits another aspect ratio.
     #[prost(uint32, tag = "2")]
     pub width: u32,
     #[prost(uint32, tag = "3")]
@@ -3804,6 +3803,9 @@ pub struct StreamFramesRequest {
     /// 1 is newest for a slow reader; a fast one needs its round trip times the rate, and one more.
     #[prost(uint32, tag = "7")]
     pub max_unacknowledged: u32,
+    /// Fit of the camera's picture into one of another aspect ratio; UNSPECIFIED means CONTAIN.
+    #[prost(enumeration = "PictureFraming", tag = "8")]
+    pub framing: i32,
 }
 #[derive(Clone, PartialEq, ::prost::Message)]
 pub struct StreamFramesResponse {
@@ -4096,6 +4098,37 @@ impl TryOnState {
             "TRY_ON_STATE_DEGRADED" => Some(Self::Degraded),
             "TRY_ON_STATE_DRAINING" => Some(Self::Draining),
             "TRY_ON_STATE_CLOSED" => Some(Self::Closed),
+            _ => None,
+        }
+    }
+}
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, ::prost::Enumeration)]
+#[repr(i32)]
+pub enum PictureFraming {
+    Unspecified = 0,
+    /// Everything, black beside it.
+    Contain = 1,
+    /// Filled; what does not fit is cut off. The crop follows the person, and rests while the person stays near its middle.
+    Cover = 2,
+}
+impl PictureFraming {
+    /// String value of the enum field names used in the ProtoBuf definition.
+    ///
+    /// The values are not transformed in any way and thus are considered stable
+    /// (if the ProtoBuf definition does not change) and safe for programmatic use.
+    pub fn as_str_name(&self) -> &'static str {
+        match self {
+            Self::Unspecified => "PICTURE_FRAMING_UNSPECIFIED",
+            Self::Contain => "PICTURE_FRAMING_CONTAIN",
+            Self::Cover => "PICTURE_FRAMING_COVER",
+        }
+    }
+    /// Creates an enum from field names used in the ProtoBuf definition.
+    pub fn from_str_name(value: &str) -> ::core::option::Option<Self> {
+        match value {
+            "PICTURE_FRAMING_UNSPECIFIED" => Some(Self::Unspecified),
+            "PICTURE_FRAMING_CONTAIN" => Some(Self::Contain),
+            "PICTURE_FRAMING_COVER" => Some(Self::Cover),
             _ => None,
         }
     }

@@ -17,7 +17,7 @@ use tryon::mirror::{
     time_step,
 };
 use tryon::view::{
-    Appearance, Config, Framing, Input, Model, OffPerson, RenderReport, State, Workspace,
+    Appearance, Framing, Input, Model, OffPerson, OutputFrame, RenderReport, State, Workspace,
 };
 use tryon_kit::frames::{Exposure, stage};
 use tryon_kit::telemetry::record_skipped;
@@ -68,7 +68,14 @@ impl Job {
     /// The format of a viewer, as jobs count them.
     pub(crate) fn wants(f: &PictureFormat) -> Format {
         Format {
-            size: f.size,
+            shape: f.size.map(|(width, height)| OutputFrame {
+                size: [width, height],
+                framing: if f.is_cropped {
+                    Framing::Cover
+                } else {
+                    Framing::Contain
+                },
+            }),
             encoding: Encoding::Jpeg(f.quality),
         }
     }
@@ -92,19 +99,13 @@ pub(crate) struct Engine {
 
 impl Engine {
     pub(crate) fn new(card: Card) -> Self {
-        // The contract says letterboxed.
-        let config = Config {
-            framing: Framing::Contain,
-            ..Config::default()
-        };
         Self {
             card,
-            model: Model::new(config),
             ..Self::default()
         }
     }
 
-    /// Renders each size once, in the order of the formats, and delivers each picture as soon as it is encoded.
+    /// Renders each shape once, in the order of the formats, and delivers each picture as soon as it is encoded.
     pub(crate) fn draw(
         &mut self,
         job: &Job,
@@ -130,13 +131,13 @@ impl Engine {
                 posed
             })
         });
-        for size in distinct(job.formats.iter().map(|f| f.size)) {
+        for shape in distinct(job.formats.iter().map(|f| f.shape)) {
             let input = Input {
                 frame: &job.exposure.rgbd,
                 calibration: &job.exposure.calibration,
                 garments: &views,
                 body,
-                output: size.map(|(w, h)| [w, h]),
+                output: shape,
             };
             let (image, report) = self
                 .card
@@ -150,7 +151,7 @@ impl Engine {
                 cost: begun.elapsed(),
                 stage: stage("compositor.render", begun),
             };
-            for format in job.formats.iter().filter(|f| f.size == size) {
+            for format in job.formats.iter().filter(|f| f.shape == shape) {
                 deliver(rendered.encode(job, *format)?);
             }
             begun = Instant::now();
@@ -228,6 +229,10 @@ fn record(report: &RenderReport) {
             ("hidden garments", report.garments_hidden),
             ("normals", report.normals_skipped),
             ("hands away from garments", report.hands.skipped),
+            (
+                "own clothes before a scene never seen",
+                report.own_clothes.map_or(0, |own| own.left),
+            ),
         ],
     );
 }

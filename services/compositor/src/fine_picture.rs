@@ -171,7 +171,7 @@ impl FinePicture {
         drop(simulation);
         job.placed = Some(Arc::new(placed(&started, &positions, begun)?));
         job.formats = vec![Format {
-            size: None,
+            shape: None,
             encoding: self.encoding,
         }];
         Ok(self.draw(job).await?)

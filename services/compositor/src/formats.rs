@@ -7,12 +7,13 @@ use crate::encoding::Encoding;
 use std::collections::BTreeMap;
 use tokio::time::{Duration, Instant};
 use tryon::geometry::settings;
+use tryon::view::OutputFrame;
 
 /// Format of a picture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) struct Format {
-    /// Pixels; `None` is the camera's.
-    pub(crate) size: Option<(u32, u32)>,
+    /// `None` is the camera's.
+    pub(crate) shape: Option<OutputFrame>,
     pub(crate) encoding: Encoding,
 }
 
@@ -89,7 +90,10 @@ impl Formats {
         let is_recent = |k: &Known| k.served.is_some_and(|t| now - t < FORGOTTEN);
         self.known
             .retain(|f, k| wanted.contains_key(f) || is_recent(k));
-        let area = |f: &Format| f.size.map_or(pixels, |(w, h)| f64::from(w) * f64::from(h));
+        let area = |f: &Format| {
+            f.shape
+                .map_or(pixels, |s| s.size.iter().copied().map(f64::from).product())
+        };
         let fresh = Known {
             cost: None,
             served: None,
@@ -152,6 +156,7 @@ impl Formats {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use tryon::view::Framing;
 
     const PIXELS: f64 = 640.0 * 480.0;
     const INTERVAL: Duration = Duration::from_millis(33);
@@ -161,7 +166,10 @@ mod tests {
 
     fn format(w: u32, h: u32) -> Format {
         Format {
-            size: Some((w, h)),
+            shape: Some(OutputFrame {
+                size: [w, h],
+                framing: Framing::Contain,
+            }),
             encoding: Encoding::Jpeg(80),
         }
     }
@@ -184,7 +192,7 @@ mod tests {
             }
             free = free.max(now);
             for f in chosen {
-                let (w, h) = f.size.expect("a size");
+                let [w, h] = f.shape.expect("a shape").size;
                 let cost = Duration::from_secs_f64(f64::from(w) * f64::from(h) * 3e-8);
                 formats.record(f, cost);
                 *drawn.entry(f).or_default() += 1;

@@ -55,6 +55,7 @@ const FILES: &[File] = files! {
     "js/mirror.js": JS,
     "js/outfit.js": JS,
     "js/presentation.js": JS,
+    "js/shape.js": JS,
     "js/stats.js": JS,
     "js/try_on.js": JS,
     "js/wardrobe.js": JS,

@@ -147,7 +147,7 @@ impl Session {
             placed: Some(Arc::new(self.placed())),
             body: None,
             formats: vec![Format {
-                size: None,
+                shape: None,
                 encoding: Encoding::Jpeg(90),
             }],
             fit: None,

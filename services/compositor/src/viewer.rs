@@ -297,6 +297,7 @@ mod tests {
 
     const FORMAT: PictureFormat = PictureFormat {
         size: None,
+        is_cropped: false,
         quality: 80,
         interval: Duration::ZERO,
         window: None,

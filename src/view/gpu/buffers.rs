@@ -25,7 +25,7 @@ pub(super) struct SceneData {
     light: [f32; 4],
     limits: [f32; 4],
     room: [[f32; 4]; 3],
-    grain: [f32; 4],
+    brightness: [f32; 4],
     picture: [u32; 4],
 }
 
@@ -59,10 +59,15 @@ impl SceneData {
             ],
             up: [shader.up.x, shader.up.y, shader.up.z, l.sky],
             key: [shader.key.x, shader.key.y, shader.key.z, l.key],
-            light: [l.ground, l.inside, l.contact, shader.brightness],
+            light: [l.ground, l.inside, l.contact, grain.sigma / 255.0],
             limits: [FOLD_GAP, l.contact_depth, NO_SHADOW, behind],
             room: shader.room_rows(),
-            grain: [grain.sigma / 255.0, 0.0, 0.0, 0.0],
+            brightness: [
+                shader.brightness[0],
+                shader.brightness[1],
+                shader.brightness[2],
+                0.0,
+            ],
             picture: [grain.picture, 0, 0, 0],
         }
     }

@@ -14,7 +14,7 @@ struct Scene {
     up: vec4f,
     // Direction of the key lamp; its strength.
     key: vec4f,
-    // Ground, inside, contact, brightness.
+    // Ground, inside, contact, grain over 255.
     light: vec4f,
     // Fold gap (metres), shadow depth (metres), least shadow, displacement of inner sides (metres).
     limits: vec4f,
@@ -22,8 +22,8 @@ struct Scene {
     red: vec4f,
     green: vec4f,
     blue: vec4f,
-    // Grain over 255.
-    grain: vec4f,
+    // Light over that of the lamps, by channel.
+    brightness: vec4f,
     // Number of the picture.
     picture: vec4u,
 }
@@ -418,7 +418,7 @@ fn shaded(face: u32, at: vec2f, shadow: f32) -> vec3f {
     let f = fabrics[owner & 255u];
     let footprint = high.z / (scene.camera.x * facing);
     let color = albedo(f, high.xy, footprint);
-    let gain = scene.light.w * select(1.0, scene.light.y, inner) * (1.0 - shadow);
+    let gain = scene.brightness.xyz * select(1.0, scene.light.y, inner) * (1.0 - shadow);
     if f.cloth.w > 0u {
         let place = attributes[i.x].place * w.x + attributes[i.y].place * w.y + attributes[i.z].place * w.z;
         let m = attributes[i.x].ridges * w.x + attributes[i.y].ridges * w.y + attributes[i.z].ridges * w.z;
@@ -507,7 +507,7 @@ fn compose(@builtin(position) at: vec4f) -> @location(0) vec4f {
             color /= f32(pixel.z);
         }
         let speck = noise(vec2u(floor(at.xy) + scene.area.xy), scene.picture.x);
-        color = clamp(color + scene.grain.x * speck, vec3f(0.0), vec3f(1.0));
+        color = clamp(color + scene.light.w * speck, vec3f(0.0), vec3f(1.0));
     }
     return vec4f(color * cover, dark * (1.0 - cover));
 }

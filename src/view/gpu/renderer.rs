@@ -150,7 +150,7 @@ impl Renderer {
         work: &mut Workspace,
     ) -> Result<(ColorImage, RenderReport), RenderError> {
         state.keep_if(input.body.is_some());
-        let mut picture = Composition::begin(model, input, work)?;
+        let mut picture = Composition::begin(model, state, input, work)?;
         let Some(area) = picture.area else {
             return Ok(picture.end(work));
         };

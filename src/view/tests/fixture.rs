@@ -3,12 +3,12 @@
 use crate::evidence::depth_sigma;
 use crate::limbs::{Arm, Limbs};
 use crate::{
-    Appearance, BodyView, GarmentView, Input, Model, RenderError, RenderReport, State, Workspace,
-    render,
+    Appearance, BodyView, Framing, GarmentView, Input, Model, OutputFrame, RenderError,
+    RenderReport, State, Workspace, render,
 };
 use rand::{Rng, SeedableRng};
 use std::ops::Range;
-use tryon_body::parts::BodyPart;
+use tryon_body::parts::{BodyPart, BodySegment};
 use tryon_geometry::camera::{Calibration, ColorImage, DepthImage, Intrinsics, RgbdFrame};
 use tryon_geometry::math::{P3, V3};
 use tryon_geometry::mesh::Face;
@@ -183,6 +183,7 @@ impl Scenery {
             arms: [arm, Arm::default()],
             face: face.collect(),
             trunk: trunk.collect(),
+            segments: Vec::new(),
         };
         let visible = visibility(camera, &body.vertices, &body.faces);
         let captured = capture(&visible, camera, seed, light, |f| match f {
@@ -195,6 +196,50 @@ impl Scenery {
             limbs,
             ..Self::assemble(camera, body, captured, [0.205, 0.145], [20, 220, 60])
         }
+    }
+
+    /// A shirt a centimetre off the trunk over own clothes of colour `own` that are 5 cm thick, with long sleeves on an arm
+    /// that hangs beside the trunk. The picture before anybody came is the second.
+    pub(crate) fn loose(seed: u64, own: [u8; 3]) -> (Self, RgbdFrame) {
+        use BodySegment::{Chest, Forearm, Head};
+        let camera = Intrinsics::KINECT_V1;
+        let mut body = TubeMesh::default();
+        let trunk = body.add_upright(TRUNK_ENDS, TRUNK, TRUNK_GRID);
+        let face = body.add_upright([-0.72, -0.48], [0.08, 0.09], ARM_GRID);
+        let own_faces = body.faces.len();
+        let radii = [V3::new(-0.04, 0.0, 0.0), V3::new(0.0, 0.0, -0.04)];
+        let ends = [-0.3, 0.3].map(|y| P3::new(0.32, y, DISTANCE));
+        let arm = body.add(ends, radii, ARM_GRID);
+        let mut dressed = body.vertices.clone();
+        for p in &mut dressed[..trunk.len()] {
+            p.x *= 1.0 + 0.05 / TRUNK[0];
+        }
+        let face_faces = own_faces - 2 * (ARM_GRID[0] * ARM_GRID[1]) as usize;
+        let visible = visibility(camera, &dressed, &body.faces);
+        let captured = capture(&visible, camera, seed, 1.0, |f| match f {
+            f if (face_faces..own_faces).contains(&f) => (false, SKIN),
+            _ => (false, own),
+        });
+        let mut nobody = VisibilityBuffer::default();
+        nobody.face = vec![VisibilityBuffer::NONE; camera.pixels()];
+        nobody.depth = vec![f32::INFINITY; camera.pixels()];
+        let empty = capture(&nobody, camera, seed + 1, 1.0, |_| (false, own));
+        let segment = |v: u32| match v {
+            v if arm.contains(&v) => Forearm,
+            v if face.contains(&v) => Head,
+            _ => Chest,
+        };
+        let limbs = Limbs {
+            parts: vec![BodyPart::Trunk; body.vertices.len()],
+            segments: (0..body.vertices.len() as u32).map(segment).collect(),
+            face: face.clone().collect(),
+            ..Limbs::default()
+        };
+        let assembled = Self {
+            limbs,
+            ..Self::assemble(camera, body, captured, [0.182, 0.122], [30, 90, 60])
+        };
+        (assembled, empty.frame)
     }
 
     fn assemble(
@@ -283,7 +328,10 @@ impl Scenery {
             calibration: &self.calibration,
             garments,
             body: Some(self.body_view()),
-            output,
+            output: output.map(|size| OutputFrame {
+                size,
+                framing: Framing::Cover,
+            }),
         }
     }
 }

@@ -78,6 +78,9 @@ fn without_colour_body_or_finite_vertices_no_arm_is_tested() {
     let (_, report) = draw_with(&s, &mut state, None);
     let mut fresh = State::default();
     draw_with(&s, &mut fresh, None);
+    // The scene, and where somebody stood in it, are nobody's colours.
+    fresh.focus = state.focus;
+    fresh.plate = state.plate.clone();
     assert_eq!((report.hands, state), (HandReport::default(), fresh));
     let first = s.limbs.arms[0].hand[0] as usize;
     s.body.vertices[first].x = f32::NAN;

@@ -3,4 +3,5 @@
 pub(crate) mod fixture;
 mod hands;
 mod off_person;
+mod own_clothes;
 mod pictures;

@@ -20,7 +20,8 @@ use tryon::mirror::{CameraGarments, DrawnLook, DrawnSurface, library_appearance}
 use tryon::synth::{Actor, Sequence, Setting};
 use tryon::view::gpu::Renderer;
 use tryon::view::{
-    BodyView, GarmentView, Input, Limbs, Model, RenderError, RenderReport, State, Workspace, render,
+    BodyView, Framing, GarmentView, Input, Limbs, Model, OutputFrame, RenderError, RenderReport,
+    State, Workspace, render,
 };
 
 const SIZES: [[u32; 2]; 3] = [[640, 480], [1280, 720], [1920, 1080]];
@@ -109,7 +110,10 @@ fn main() {
     println!("|---|---|---|---|---|");
     for size in SIZES {
         let input = Input {
-            output: Some(size),
+            output: Some(OutputFrame {
+                size,
+                framing: Framing::Cover,
+            }),
             ..input
         };
         let flat = Input {

@@ -569,7 +569,7 @@ impl Task {
         };
         let job = Job {
             formats: vec![Format {
-                size: None,
+                shape: None,
                 encoding,
             }],
             ..job.clone()

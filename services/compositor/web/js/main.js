@@ -14,6 +14,7 @@ import { State } from './messages.js';
 import { Mirror } from './mirror.js';
 import { Outfit } from './outfit.js';
 import { AWAY, present } from './presentation.js';
+import { pictureShape } from './shape.js';
 import { Stats } from './stats.js';
 import { TryOn } from './try_on.js';
 import { Wardrobe } from './wardrobe.js';
@@ -28,6 +29,8 @@ const ABANDONED_S = 180;
 const TICK_MS = 200;
 /** Several touches in a row become one request, ms. */
 const CHOICE_MS = 180;
+/** A glass that is dragged to another shape is done after this, ms. */
+const RESHAPE_MS = 300;
 /** Hosts that only this machine reaches. */
 const LOOPBACK = /^(localhost|127\..*|\[::1\])$/;
 
@@ -63,6 +66,27 @@ const mirror = new Mirror(byId('glass'), {
 
 // ── the session ──────────────────────────────────────────────────────────────────────────────────────────────────
 
+/** Shape of the pictures that the glass shows now; `{}` for the camera's. */
+function glassShape() {
+  if (stage.classList.contains('whole')) return {};
+  return pictureShape(stage.clientWidth * devicePixelRatio, stage.clientHeight * devicePixelRatio);
+}
+
+let shown = '{}';
+let settling = null;
+
+/** Asks for pictures of the glass's shape once it has stopped changing. */
+function reshape() {
+  clearTimeout(settling);
+  settling = setTimeout(() => {
+    const wanted = JSON.stringify(glassShape());
+    if (wanted === shown) return;
+    shown = wanted;
+    session?.tryOn.reshape();
+  }, RESHAPE_MS);
+}
+new ResizeObserver(reshape).observe(stage);
+
 function start() {
   if (session) return;
   const mine = { known: { ...NOTHING }, stats: new Stats(), picture: null, revision: null, fitting: new Set(), awaySince: null };
@@ -71,6 +95,7 @@ function start() {
     client,
     camera: { store: query.get('store') ?? '', camera: query.get('camera') ?? '' },
     garments: () => outfit.choices(),
+    shape: glassShape,
     on: (event) => session === mine && heard(event),
   });
   showScreen('fitting');
@@ -318,6 +343,7 @@ async function toggleFitColors() {
 
 function toggleFit() {
   byId('fit').setAttribute('aria-pressed', String(stage.classList.toggle('whole')));
+  reshape();
 }
 
 byId('start').addEventListener('click', start);

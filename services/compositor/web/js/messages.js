@@ -92,7 +92,8 @@ export const StreamFramesRequest = schema('StreamFramesRequest',
   [4, 'codec', 'enum'],
   [5, 'quality', 'uint32'],
   [6, 'max_rate', 'float'],
-  [7, 'max_unacknowledged', 'uint32']);
+  [7, 'max_unacknowledged', 'uint32'],
+  [8, 'framing', 'enum']);
 
 export const PartOffPerson = schema('PartOffPerson',
   [1, 'part', 'string'],
@@ -176,6 +177,9 @@ export const OfferPhotoResponse = schema('OfferPhotoResponse',
 
 /** `PICTURE_CODEC_*` */
 export const Codec = Object.freeze({ JPEG: 1, PNG: 2 });
+
+/** `PICTURE_FRAMING_*` */
+export const Framing = Object.freeze({ CONTAIN: 1, COVER: 2 });
 
 /** `TRY_ON_STATE_*` */
 export const State = Object.freeze({ OPENING: 1, CALIBRATING: 2, LIVE: 3, DEGRADED: 4, DRAINING: 5, CLOSED: 6 });

@@ -39,14 +39,16 @@ export function drawId() {
 export class TryOn {
   #stop = new AbortController();
   #wake = new AbortController();
+  #shaped = new AbortController();
   #choice = 0;
   #fit = false;
   #withdrawn = false;
 
-  constructor({ client, on, garments, camera = {}, backoff = new Backoff(), silenceMs = SILENCE_MS }) {
+  constructor({ client, on, garments, shape = () => ({}), camera = {}, backoff = new Backoff(), silenceMs = SILENCE_MS }) {
     this.client = client;
     this.on = on;
     this.garments = garments;
+    this.shape = shape;
     this.camera = camera;
     this.backoff = backoff;
     this.silenceMs = silenceMs;
@@ -91,8 +93,16 @@ export class TryOn {
     if (!opened.created) await this.#choose();
     if (this.#fit) await this.showFit(true);
 
+    do {
+      this.#shaped = new AbortController();
+      await this.#stream(stop, this.#shaped.signal);
+    } while (this.#shaped.signal.aborted && !stop.aborted);
+  }
+
+  /** Reads pictures until the stream ends, breaks, or another shape is wanted. */
+  async #stream(stop, shaped) {
     const line = new AbortController();
-    const signal = AbortSignal.any([stop, line.signal]);
+    const signal = AbortSignal.any([stop, line.signal, shaped]);
     let watchdog = null;
     const heard = () => {
       clearTimeout(watchdog);
@@ -100,7 +110,7 @@ export class TryOn {
     };
     heard();
     try {
-      const wanted = { try_on_id: this.id, max_unacknowledged: MAX_UNACKNOWLEDGED };
+      const wanted = { try_on_id: this.id, max_unacknowledged: MAX_UNACKNOWLEDGED, ...this.shape() };
       for await (const event of this.client.streamFrames(wanted, { signal })) {
         heard();
         this.backoff.reset();
@@ -111,11 +121,17 @@ export class TryOn {
         if (event.status?.state === State.DRAINING || event.status?.state === State.CLOSED) break;
       }
     } catch (error) {
+      if (shaped.aborted) return;
       if (line.signal.aborted && !stop.aborted) throw new RpcError(Code.UNAVAILABLE, 'nothing was heard from the mirror');
       throw error;
     } finally {
       clearTimeout(watchdog);
     }
+  }
+
+  /** Streams again in the shape that is wanted now. */
+  reshape() {
+    this.#shaped.abort();
   }
 
   /** The next acknowledgement covers one that is lost. */

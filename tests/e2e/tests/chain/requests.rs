@@ -4,6 +4,7 @@ use crate::client;
 use crate::kiosk::{Kiosk, Part, Watcher, wear};
 use tonic::{Code, Status};
 use tonic_types::StatusExt;
+use tryon::formats::image::decode_jpeg;
 use tryon_proto::v1::capture_service_client::CaptureServiceClient;
 use tryon_proto::v1::*;
 
@@ -60,6 +61,12 @@ async fn bad_compositor_requests(kiosk: &Kiosk) {
     };
     let named = field(c.stream_frames(small).await.expect_err("too small"));
     assert_eq!(named, "stream_frames_request.width");
+    let odd = StreamFramesRequest {
+        framing: 9,
+        ..Default::default()
+    };
+    let named = field(c.stream_frames(odd).await.expect_err("no such framing"));
+    assert_eq!(named, "stream_frames_request.framing");
     let unknown = StreamFramesRequest {
         try_on_id: "nobody".into(),
         ..Default::default()
@@ -116,6 +123,47 @@ fn a_reader_that_acknowledges_gets_the_next_picture_when_it_has_room() {
         let sequence = |p: &Picture| p.frame.expect("an exposure").sequence;
         assert!(second.dropped >= first.dropped + 4, "{}", second.dropped);
         assert!(sequence(second) > sequence(first) + 4, "it is a new one");
+    });
+}
+
+/// Upright pictures of a camera that lies: filled to the corners, or black above and below.
+#[test]
+fn pictures_of_another_shape_are_filled_or_letterboxed() {
+    let kiosk = Kiosk::start("pattern", 10.0);
+    client(async {
+        let _open = Watcher::open(&kiosk, "good", "front", &[]).await;
+        for (framing, is_black) in [
+            (PictureFraming::Unspecified, true),
+            (PictureFraming::Contain, true),
+            (PictureFraming::Cover, false),
+        ] {
+            let upright = StreamFramesRequest {
+                try_on_id: "good".into(),
+                width: 180,
+                height: 320,
+                framing: framing.into(),
+                ..Default::default()
+            };
+            let mut c = kiosk.compositor();
+            let mut events = c
+                .stream_frames(upright)
+                .await
+                .expect("streams")
+                .into_inner();
+            let picture = loop {
+                let message = events.message().await.expect("no fault").expect("no end");
+                if let Some(stream_frames_response::Event::Picture(p)) = message.event {
+                    break p;
+                }
+            };
+            assert_eq!((picture.width, picture.height), (180, 320));
+            let image = decode_jpeg(&picture.image).expect("a JPEG");
+            let corners = [(3, 3), (176, 3), (3, 316), (176, 316)];
+            for (u, v) in corners {
+                let is_dark = image.at(u, v).iter().all(|c| *c < 8);
+                assert_eq!(is_dark, is_black, "{framing:?} {u} {v}");
+            }
+        }
     });
 }
 
