@@ -110,18 +110,29 @@ impl<F> Pose<F> {
     /// Turns the upper arms to `angle` rad below the horizontal, to the sides; a skeleton without them keeps its pose.
     pub fn lower_arms(&mut self, skeleton: &Skeleton, rest: &RestBody, angle: f64) {
         for (side, s) in [("left", 1.0), ("right", -1.0)] {
-            let [shoulder, elbow] =
-                ["shoulder", "elbow"].map(|n| skeleton.index(&format!("{side}_{n}")));
-            let (Some(shoulder), Some(elbow)) = (shoulder, elbow) else {
-                continue;
-            };
             let down = Vector3::new(s * angle.cos(), -angle.sin(), 0.0);
-            let along = rest.joints[elbow] - rest.joints[shoulder];
-            let turn = UnitQuaternion::rotation_between(&along, &down);
-            let at = skeleton.dof_offset(shoulder);
-            if let (Some(turn), Some(angles)) = (turn, self.angles.get_mut(at..at + 3)) {
-                angles.copy_from_slice(log_so3(&turn).as_slice());
-            }
+            self.turn_arm(skeleton, rest, side, &down);
+        }
+    }
+    /// Turns the upper arm of a side (`left`, `right`) to a direction of the rest frame as seen from the trunk; a skeleton
+    /// without it keeps its pose.
+    pub fn turn_arm(
+        &mut self,
+        skeleton: &Skeleton,
+        rest: &RestBody,
+        side: &str,
+        direction: &Vector3<f64>,
+    ) {
+        let [shoulder, elbow] =
+            ["shoulder", "elbow"].map(|n| skeleton.index(&format!("{side}_{n}")));
+        let (Some(shoulder), Some(elbow)) = (shoulder, elbow) else {
+            return;
+        };
+        let along = rest.joints[elbow] - rest.joints[shoulder];
+        let turn = UnitQuaternion::rotation_between(&along, direction);
+        let at = skeleton.dof_offset(shoulder);
+        if let (Some(turn), Some(angles)) = (turn, self.angles.get_mut(at..at + 3)) {
+            angles.copy_from_slice(log_so3(&turn).as_slice());
         }
     }
     /// Moves every angle into its limits.
