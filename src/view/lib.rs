@@ -57,6 +57,7 @@
 //! - Light of the room, from the captured person: [`mod@room_light`], its level: [`mod@room_level`]. Grain of the camera: [`mod@grain`].
 //! - Fabric colour and prints: [`mod@appearance`]. Yarns and surface: [`mod@cloth_tile`]; both: [`mod@cloth`].
 //! - Seams, hems, ribs: [`mod@construction`], [`mod@edge_profile`].
+//! - Normals of a garment as they are shaded, for judges of folds: [`mod@drawn_normals`].
 //! - Images on fabric: [`mod@image_pyramid`].
 //! - Card or processor: [`mod@gpu::choice`].
 //! - Shaders: [`mod@gpu::pipelines`].
@@ -77,6 +78,7 @@ mod config;
 mod construction;
 pub(crate) mod contact_shadow;
 pub(crate) mod coverage;
+mod drawn_normals;
 mod edge_profile;
 mod evidence;
 mod focus;
@@ -112,6 +114,7 @@ pub use appearance::{Appearance, Print};
 pub use cloth::ShadedCloth;
 pub use config::{Config, Lights, Margins, Model};
 pub use construction::{EdgePlace, edge_places};
+pub use drawn_normals::{SurfacePoint, drawn_normals};
 pub use image_pyramid::ImagePyramid;
 pub use input::{BodyView, Framing, GarmentView, Input, OutputFrame, RenderError};
 pub use limbs::Limbs;

@@ -1,7 +1,7 @@
 //! Light on cloth: hemisphere light, one key lamp, openness of folds, the inner side.
 
 use super::appearance::Fabric;
-use super::cloth::ShadedCloth;
+use super::cloth::{ClothSample, ShadedCloth};
 use super::config::Lights;
 use super::construction::EdgePlace;
 use super::room_light::RoomLight;
@@ -151,21 +151,8 @@ impl<'a> Shader<'a> {
             );
         }
         let ray = self.camera.unproject(u, v, 1.0).coords;
-        let [
-            nx,
-            ny,
-            nz,
-            open,
-            tu,
-            tv,
-            z,
-            free,
-            along,
-            seam,
-            upper,
-            _,
-            ridges @ ..,
-        ] = cache.interpolate(&ray);
+        let attributes = cache.interpolate(cache.weights(&ray));
+        let [nx, ny, nz, open, tu, tv, z, ..] = attributes;
         let eye = ray * -ray.norm_squared().sqrt().recip();
         let n = V3::new(nx, ny, nz);
         let length = n.norm_squared().sqrt();
@@ -188,17 +175,8 @@ impl<'a> Shader<'a> {
             let sheen = self.sheen(&n, &eye, fabric.gloss);
             return [0, 1, 2].map(|c| self.to_srgb.get((albedo[c] * diffuse + sheen) * gain[c]));
         };
-        let place = EdgePlace {
-            free,
-            along,
-            seam,
-            is_upper: upper > 0.5,
-        };
-        let uv = [tu, tv].map(|t| t * fabric.metres_per_uv);
-        let relief = cloth.sample(uv, &place, ridges, footprint);
-        let tilt: V3 = (cache.along.iter().zip(relief.slopes))
-            .map(|(g, s)| g * s)
-            .sum();
+        let relief = relief(cloth, &attributes, fabric.metres_per_uv, footprint);
+        let tilt = cache.tilt(&relief);
         let n = unit(n - if is_inner { -tilt } else { tilt });
         let albedo = albedo.map(|a| a * relief.tone);
         let light = ClothLight {
@@ -277,11 +255,49 @@ impl ClothLight<'_> {
     }
 }
 
+/// Relief of a cloth at interpolated attributes, mean over about `footprint` metres.
+#[inline]
+pub(crate) fn relief(
+    cloth: &ShadedCloth,
+    attributes: &VertexAttributes,
+    metres_per_uv: f32,
+    footprint: f32,
+) -> ClothSample {
+    let [
+        _,
+        _,
+        _,
+        _,
+        tu,
+        tv,
+        _,
+        free,
+        along,
+        seam,
+        upper,
+        _,
+        ridges @ ..,
+    ] = *attributes;
+    let place = EdgePlace {
+        free,
+        along,
+        seam,
+        is_upper: upper > 0.5,
+    };
+    let uv = [tu, tv].map(|t| t * metres_per_uv);
+    cloth.sample(uv, &place, ridges, footprint)
+}
+
 /// Steepest gradient of a coordinate along the surface that is believed: beyond it, an edge's length jumps within a face.
 const STEEPEST: f32 = 2.5;
 
 impl ShadedFace {
-    fn new(face: u32, [a, b, c]: [V3; 3], corners: [VertexAttributes; 3], fabric: &Fabric) -> Self {
+    pub(crate) fn new(
+        face: u32,
+        [a, b, c]: [V3; 3],
+        corners: [VertexAttributes; 3],
+        fabric: &Fabric,
+    ) -> Self {
         let mut along = [V3::zeros(); 5];
         if fabric.cloth.is_some() {
             let n = (b - a).cross(&(c - a));
@@ -314,18 +330,30 @@ impl ShadedFace {
         }
     }
 
-    /// Attributes along `ray`; outside the face, which a pixel's centre may be, those of the nearest edge.
+    /// Gradient along the surface of a relief's height.
     #[inline]
-    fn interpolate(&self, ray: &V3) -> VertexAttributes {
+    pub(crate) fn tilt(&self, relief: &ClothSample) -> V3 {
+        let slopes = self.along.iter().zip(relief.slopes);
+        slopes.map(|(g, s)| g * s).sum()
+    }
+
+    /// Barycentric coordinates of `ray`; outside the face, which a pixel's centre may be, those of the nearest edge.
+    #[inline]
+    fn weights(&self, ray: &V3) -> [f32; 3] {
         let w = self.gradient.map(|g| g.dot(ray));
         let sum = w[0] + w[1] + w[2];
         let w = w.map(|w| (w / sum).max(0.0));
         let sum = w[0] + w[1] + w[2];
-        let w = if sum > 0.0 {
+        if sum > 0.0 {
             w.map(|w| w / sum)
         } else {
             [1.0, 0.0, 0.0]
-        };
+        }
+    }
+
+    /// Attributes at barycentric coordinates.
+    #[inline]
+    pub(crate) fn interpolate(&self, w: [f32; 3]) -> VertexAttributes {
         let k = &self.corners;
         std::array::from_fn(|i| k[0][i] * w[0] + k[1][i] * w[1] + k[2][i] * w[2])
     }

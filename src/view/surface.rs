@@ -5,7 +5,7 @@
 
 use super::appearance::Fabric;
 use super::area::{Area, NEAR};
-use super::config::Config;
+use super::config::{Config, Lights};
 use super::construction::EdgePlace;
 use super::input::{GarmentView, Input};
 use super::viewport::Viewport;
@@ -128,6 +128,15 @@ impl Surface {
             .map(|p| p.z)
             .collect();
         self.distance = median(&mut z).unwrap_or(1.0).max(NEAR);
+    }
+
+    /// One garment alone, every face shaded.
+    pub(crate) fn shaded(garment: &GarmentView<'_>) -> Self {
+        let mut surface = Self::default();
+        surface.append(garment, 0, &nalgebra::Isometry3::identity(), 0.0);
+        surface.visible.reset(surface.faces.len(), true);
+        surface.shade_vertices(&Lights::default());
+        surface
     }
 
     /// Appends one garment, displaced by `nearer` metres along the line of sight, which keeps its outline.
