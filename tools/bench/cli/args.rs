@@ -4,6 +4,8 @@ use clap::{Args, Parser, Subcommand, ValueEnum};
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
 use tryon_bench::OutfitSpec;
+use tryon_bench::folds::poses::FoldPose;
+use tryon_bench::folds::{FoldsBench, GARMENTS};
 use tryon_bench::people::PeoplePlan;
 use tryon_bench::tracking_plan::TrackingPlan;
 use tryon_bench::worn::WornMotion;
@@ -34,6 +36,8 @@ pub(crate) enum Command {
     Standing(StandingArgs),
     /// Outfits worn through motions: crossings of cloth with cloth, speed at rest, stretch, time.
     Worn(WornArgs),
+    /// Folds of drawn garments against the offline solver's in the same pose: energy, direction, places.
+    Folds(FoldsArgs),
     /// Dress bodies and draw each outfit from several sides.
     Turntable(TurntableArgs),
     /// Tracking of everyone who walks in: people, postures and sides from nothing, stills and recordings.
@@ -213,6 +217,59 @@ pub(crate) struct WornArgs {
     /// Folder of the shared data.
     #[arg(long, value_name = "DIR", default_value = "../shared/data")]
     pub(crate) data: PathBuf,
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct FoldsArgs {
+    /// Folder for folds.md and folds.json.
+    #[arg(long, value_name = "DIR")]
+    pub(crate) out: PathBuf,
+    /// Garments of the library; without any: T-shirt, hooded top, flared skirt, trousers.
+    #[arg(long, value_name = "NAME", value_delimiter = ',')]
+    pub(crate) garment: Vec<String>,
+    /// Poses; without any, all.
+    #[arg(long, value_delimiter = ',')]
+    pub(crate) pose: Vec<FoldPose>,
+    /// Vertices of the offline solver's mesh, about.
+    #[arg(long, value_name = "N", default_value_t = 30_000)]
+    pub(crate) vertices: usize,
+    /// Two garments in three poses against 12,000 vertices.
+    #[arg(long, conflicts_with_all = ["garment", "pose", "vertices"])]
+    pub(crate) quick: bool,
+    /// Folder of the offline solver's meshes at rest: read if they are there, written otherwise.
+    #[arg(long, value_name = "DIR")]
+    pub(crate) truth: Option<PathBuf>,
+    /// Worker threads; 0 means one per core.
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    pub(crate) threads: usize,
+}
+
+impl FoldsArgs {
+    /// Extent of the comparison.
+    pub(crate) fn bench(&self) -> FoldsBench {
+        let names = |all: &[&str]| all.iter().map(|n| (*n).to_owned()).collect();
+        let truth = self.truth.clone();
+        if self.quick {
+            return FoldsBench {
+                garments: names(&["tshirt", "skirt"]),
+                poses: vec![FoldPose::Rest, FoldPose::Forward, FoldPose::Twisted],
+                vertices: 12_000,
+                truth,
+            };
+        }
+        FoldsBench {
+            garments: match &self.garment[..] {
+                [] => names(&GARMENTS),
+                some => some.to_vec(),
+            },
+            poses: match &self.pose[..] {
+                [] => FoldPose::ALL.to_vec(),
+                some => some.to_vec(),
+            },
+            vertices: self.vertices,
+            truth,
+        }
+    }
 }
 
 #[derive(Debug, Args)]

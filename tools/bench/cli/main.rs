@@ -24,6 +24,7 @@ fn main() -> ExitCode {
         Command::Dance(a) => measure::dance(&a),
         Command::Standing(a) => measure::standing(&a),
         Command::Worn(a) => measure::worn(&a),
+        Command::Folds(a) => measure::folds(&a),
         Command::People(a) => measure::people(&a),
         Command::Clothcap(a) => measure::clothcap(&a),
         Command::Ccd(a) => ccd::run(&a),

@@ -1,7 +1,7 @@
 //! Tables of run time against error.
 
 use crate::args::{
-    ClothArgs, ClothcapArgs, DanceArgs, PeopleArgs, StandingArgs, TrackingArgs, WornArgs,
+    ClothArgs, ClothcapArgs, DanceArgs, FoldsArgs, PeopleArgs, StandingArgs, TrackingArgs, WornArgs,
 };
 use crate::progress::progress;
 use anyhow::Result;
@@ -12,6 +12,7 @@ use tryon::garment::{Triangulation, library};
 use tryon::geometry::par::with_threads;
 use tryon_bench::cloth_offline::{self, OfflineBench};
 use tryon_bench::dance::load;
+use tryon_bench::folds::measure_folds;
 use tryon_bench::garment_capture::{
     capture_scenes, made_scenes, measure, measure_turn_scene, turn_scenes,
 };
@@ -152,6 +153,19 @@ pub(crate) fn worn(args: &WornArgs) -> Result<ExitCode> {
     if let Some(folder) = &meshes {
         folder.finish()?;
     }
+    finish(&table, &args.out)
+}
+
+/// Runs `tryon-bench folds`.
+pub(crate) fn folds(args: &FoldsArgs) -> Result<ExitCode> {
+    let bar = progress(None, "measuring");
+    let table = with_threads(args.threads, || {
+        measure_folds(&args.bench(), |row| {
+            bar.set_message(format!("{}, {}", row.scene, row.method));
+            bar.inc(1);
+        })
+    })??;
+    bar.finish_and_clear();
     finish(&table, &args.out)
 }
 

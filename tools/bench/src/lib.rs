@@ -16,6 +16,7 @@
 //! - Captured garments against truth: [`mod@garment_capture::score`].
 //! - The dance: [`mod@dance`].
 //! - Outfits worn through motions: [`mod@worn`].
+//! - Folds finer than the simulation against the offline solver's: [`mod@folds`], their measure [`mod@folds::band`].
 //! - Dressed scans with truth per point: [`mod@scans::scene`].
 //! - The embedded body: [`mod@made_body::figure`] (proportions), [`mod@made_body::field`] (surface),
 //!   [`mod@made_body::rig`], [`mod@made_body::directions`] (shape space), [`mod@made_body::statistics`] (published measurements).
@@ -34,6 +35,7 @@ mod dance_bodies;
 mod depth_scene;
 pub mod dress_offline;
 mod error;
+pub mod folds;
 pub mod garment_capture;
 mod inside;
 pub mod made_body;
