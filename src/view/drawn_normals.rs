@@ -7,7 +7,7 @@ use tryon_geometry::math::V3;
 
 /// Point of a triangle mesh.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct SurfacePoint {
+pub struct DrawnPoint {
     /// Face.
     pub face: u32,
     /// Barycentric coordinates.
@@ -16,12 +16,12 @@ pub struct SurfacePoint {
 
 /// Outward unit normals at points of a garment, in its frame: interpolated, with wrinkles and relief of its cloth as means
 /// over about `footprint` metres. Faces that are out of range have the zero vector.
-pub fn drawn_normals(garment: &GarmentView<'_>, at: &[SurfacePoint], footprint: f32) -> Vec<V3> {
+pub fn drawn_normals(garment: &GarmentView<'_>, at: &[DrawnPoint], footprint: f32) -> Vec<V3> {
     let surface = Surface::shaded(garment);
     let [fabric] = &surface.fabrics[..] else {
         return vec![V3::zeros(); at.len()];
     };
-    let normal = |point: &SurfacePoint| {
+    let normal = |point: &DrawnPoint| {
         let Some(face) = surface.faces.get(point.face as usize) else {
             return V3::zeros();
         };
@@ -54,10 +54,10 @@ mod tests {
     fn compressed_cloth_has_wrinkles_about_the_mesh_normal() {
         let flat = [[0.0, 0.0], [0.3, 0.0], [0.0, 0.3]];
         let worn = flat.map(|[u, v]| P3::new(0.96 * u, v, 2.0));
-        let at: Vec<SurfacePoint> = (0..200)
+        let at: Vec<DrawnPoint> = (0..200)
             .map(|i| {
                 let share = i as f32 / 400.0;
-                SurfacePoint {
+                DrawnPoint {
                     face: 0,
                     weights: [0.5, share, 0.5 - share],
                 }

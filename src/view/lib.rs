@@ -114,7 +114,7 @@ pub use appearance::{Appearance, Print};
 pub use cloth::ShadedCloth;
 pub use config::{Config, Lights, Margins, Model};
 pub use construction::{EdgePlace, edge_places};
-pub use drawn_normals::{SurfacePoint, drawn_normals};
+pub use drawn_normals::{DrawnPoint, drawn_normals};
 pub use image_pyramid::ImagePyramid;
 pub use input::{BodyView, Framing, GarmentView, Input, OutputFrame, RenderError};
 pub use limbs::Limbs;

@@ -8,7 +8,6 @@ use super::config::Config;
 use super::input::BodyView;
 use super::room_level;
 use super::settings::RoomLightSettings;
-use super::shading::lit;
 use super::srgb::linear;
 use nalgebra::{Matrix4, Vector4};
 use serde::{Deserialize, Serialize};
@@ -21,6 +20,15 @@ const REGIONS: usize = 3;
 const LEAST_MEAN: f32 = 0.2;
 /// Rounds of albedo and light in turns, each with new weights.
 const ROUNDS: usize = 8;
+
+/// Square of the light on a side that the room's light would leave black.
+const LEAST_LIGHT: f32 = 0.02;
+
+/// Linear light with a smooth end: no side is without any.
+#[inline]
+pub(crate) fn lit(e: f32) -> f32 {
+    0.5 * (e + (e * e + LEAST_LIGHT).sqrt())
+}
 
 /// Light of a room by channel: the mean, times 1 + slope·n on a surface of normal n (picture's camera).
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]

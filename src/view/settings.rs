@@ -85,8 +85,12 @@ settings! {
         pub most_tones: usize = 400,
         /// Share of the clothes that looks like skin above which nothing can be told apart.
         pub mixed: f32 = 0.3,
-        /// Skin against clothes by colour.
-        pub colors: SkinSettings = SkinSettings { unknown_clothes: -12.0, ..SkinSettings::default() },
+        /// Skin against clothes by colour. Light on arms and legs is not that on the face: chroma tells more than brightness.
+        pub colors: SkinSettings = SkinSettings {
+            min_sigma: [20.0, 3.0, 3.0],
+            unknown_clothes: -12.0,
+            ..SkinSettings::default()
+        },
     }
 
     /// Settings of the mean light of the room.

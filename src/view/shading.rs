@@ -4,7 +4,7 @@ use super::appearance::Fabric;
 use super::cloth::{ClothSample, ShadedCloth};
 use super::config::Lights;
 use super::construction::EdgePlace;
-use super::room_light::RoomLight;
+use super::room_light::{RoomLight, lit};
 use super::srgb::ToSrgb;
 use super::surface::{Surface, VertexAttributes};
 use tryon_geometry::camera::Intrinsics;
@@ -16,8 +16,6 @@ const WRAP: f32 = 0.25;
 const GRAZING: f32 = 0.2;
 /// Slope of the room's light below which it has no direction.
 const MIN_SLOPE: f32 = 0.05;
-/// Square of the light on a side that the room's light would leave black.
-const LEAST_LIGHT: f32 = 0.02;
 /// Exponent of the sheen of satin (Blinn–Phong).
 const SHEEN_POWER: i32 = 16;
 /// Sheen of satin at its brightest.
@@ -28,12 +26,6 @@ const SHEEN: f32 = 0.25;
 const FUZZ_HIDES: f32 = 0.5;
 const FUZZ_WHITE: f32 = 0.15;
 const FUZZ_DYED: f32 = 0.5;
-
-/// Linear light with a smooth end: no side is without any.
-#[inline]
-pub(crate) fn lit(e: f32) -> f32 {
-    0.5 * (e + (e * e + LEAST_LIGHT).sqrt())
-}
 
 /// Direction of a vector; zero for zero.
 #[inline]

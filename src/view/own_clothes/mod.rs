@@ -26,6 +26,8 @@ use worn::OwnWorn;
 
 /// Rows looked at by one task.
 const ROWS: usize = 8;
+/// Light over the mean on skin below which its colour tells little of it.
+const LEAST_LIGHT: f32 = 0.1;
 
 /// Pixels of own clothes beside garments that take their place.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -38,14 +40,7 @@ pub struct OwnClothesReport {
     pub left: usize,
 }
 
-/// Median of colours in linear light; `None` of too few.
-fn median_light(colors: &[[u8; 3]]) -> Option<[f32; 3]> {
-    const LEAST: usize = 12;
-    let light: Vec<[f32; 3]> = colors.iter().map(|c| c.map(linear)).collect();
-    (light.len() >= LEAST).then(|| medians(&light)).flatten()
-}
-
-/// What a pixel becomes.
+/// New state of a pixel.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Change {
     None,
@@ -123,7 +118,11 @@ impl OwnClothes {
             settings,
         )?;
         self.mark(picture, &worn, &cover);
-        Some(self.changes(picture, &SkinLight::new(picture, &worn), &cover))
+        if !self.is_own.contains(&true) {
+            return Some(Default::default());
+        }
+        let skin = SkinLight::new(picture, &worn, &self.field);
+        Some(self.changes(picture, skin.as_ref(), &cover))
     }
 
     /// Place of a pixel of the window.
@@ -171,13 +170,13 @@ impl OwnClothes {
     fn changes(
         &self,
         picture: &DressedPicture<'_>,
-        skin: &SkinLight<'_>,
+        skin: Option<&SkinLight<'_>>,
         cover: &impl Fn([u32; 2]) -> f32,
     ) -> (ChangedPixels, OwnClothesReport) {
         let captured = &picture.captured;
         let (mut out, mut report) = (Vec::new(), OwnClothesReport::default());
         // Antialiased pixels around own clothes are part of them.
-        let edge = (captured.viewport.scale.ceil() as usize).max(1);
+        let edge = ((2.0 * captured.viewport.scale).ceil() as usize).max(1);
         let (columns, width) = (captured.image.width() as usize, self.window.width as usize);
         for (i, &is_own) in self.is_own.iter().enumerate() {
             if !is_own && !is_beside(&self.is_own, width, i, edge) {
@@ -188,7 +187,7 @@ impl OwnClothes {
                 continue;
             };
             let seen = usize::from(is_own && cover(pixel) < 0.5);
-            let color = match change(picture, skin, &near, pixel, is_own) {
+            let color = match change(picture, skin, &near, pixel) {
                 Change::None => {
                     report.left += seen;
                     continue;
@@ -210,19 +209,16 @@ impl OwnClothes {
 
 fn change(
     picture: &DressedPicture<'_>,
-    skin: &SkinLight<'_>,
+    skin: Option<&SkinLight<'_>>,
     near: &NearBody,
     pixel: [u32; 2],
-    is_own: bool,
 ) -> Change {
-    if !near.is_on {
-        let scene = picture.plate.at(&picture.captured, pixel);
-        return scene.map_or(Change::None, Change::Scene);
+    if near.is_on {
+        let skin = skin.and_then(|s| s.at(near.face, pixel));
+        return skin.map_or(Change::None, Change::Skin);
     }
-    match skin.at(near.face, pixel) {
-        Some(skin) if is_own => Change::Skin(skin),
-        _ => Change::None,
-    }
+    let scene = picture.plate.at(&picture.captured, pixel);
+    scene.map_or(Change::None, Change::Scene)
 }
 
 /// True with an own pixel within `edge` pixels along the row or the column.
@@ -297,21 +293,45 @@ impl HeadCircle {
 struct SkinLight<'a> {
     picture: &'a DressedPicture<'a>,
     normals: Vec<V3>,
-    /// Linear light of skin towards the camera.
-    skin: [f32; 3],
+    /// Linear light of skin over that which falls on it.
+    albedo: [f32; 3],
 }
 
 impl<'a> SkinLight<'a> {
-    fn new(picture: &'a DressedPicture<'a>, worn: &OwnWorn) -> Self {
-        Self {
+    /// Skin like that which is seen on face, arms and hands; `None` of too little.
+    fn new(picture: &'a DressedPicture<'a>, worn: &OwnWorn, field: &BodyField) -> Option<Self> {
+        const LEAST: usize = 12;
+        let unknown = Self {
             normals: normals(&picture.body, picture.vertices),
-            skin: worn.skin,
+            albedo: [0.0; 3],
             picture,
-        }
+        };
+        let captured = &picture.captured;
+        let on_body = picture.config.own_clothes.on_body;
+        let albedo = |cell: usize| {
+            let near = field.at_cell(cell).filter(|n| n.is_on)?;
+            let segment = segment(&picture.body, near.face)?;
+            use BodySegment::{Fingers, Forearm, Hand, Head, UpperArm};
+            if ![Head, UpperArm, Forearm, Hand, Fingers].contains(&segment) {
+                return None;
+            }
+            let pixel @ [u, v] = field.pixel(cell);
+            let color = captured.image.at(u, v);
+            let metres = captured.metres(u, v);
+            let is_seen = metres > 0.0 && (metres - near.depth).abs() < on_body;
+            if !is_seen || !worn.is_skin(color) {
+                return None;
+            }
+            let light = unknown.light(&unknown.normal(near.face, pixel)?);
+            Some([0, 1, 2].map(|c| linear(color[c]) / light[c].max(LEAST_LIGHT)))
+        };
+        let seen: Vec<[f32; 3]> = (0..field.cells()).filter_map(albedo).collect();
+        let albedo = medians(&seen).filter(|_| seen.len() >= LEAST)?;
+        Some(Self { albedo, ..unknown })
     }
 
-    /// Colour of the body's skin at a pixel of a face.
-    fn at(&self, face: u32, [u, v]: [u32; 2]) -> Option<[u8; 3]> {
+    /// Unit normal at a pixel of a face.
+    fn normal(&self, face: u32, [u, v]: [u32; 2]) -> Option<V3> {
         let f = self.picture.body.faces.get(face as usize)?;
         let corners = f.map(|k| self.picture.vertices[k as usize]);
         let view = View::Perspective {
@@ -322,16 +342,21 @@ impl<'a> SkinLight<'a> {
         // A cell's middle may lie beside the face.
         let w = w.map(|w| w.clamp(0.0, 1.0));
         let n: V3 = (0..3).map(|k| self.normals[f[k] as usize] * w[k]).sum();
-        let n = n.try_normalize(0.0)?;
-        let front = V3::new(0.0, 0.0, -1.0);
-        let light = |n: &V3| match self.picture.light {
+        n.try_normalize(0.0)
+    }
+
+    /// Light on a surface of normal `n` over the mean, by channel.
+    fn light(&self, n: &V3) -> [f32; 3] {
+        match self.picture.light {
             Some(room) => room.relative(n),
-            None => [1.0 + 0.5 * n.dot(&front); 3],
-        };
-        let (here, front) = (light(&n), light(&front));
-        Some([0, 1, 2].map(|c| {
-            let seen = self.skin[c] * here[c] / front[c].max(f32::EPSILON);
-            self.picture.to_srgb.get(seen).round() as u8
-        }))
+            None => [1.0 - 0.5 * n.z; 3],
+        }
+    }
+
+    /// Colour of the body's skin at a pixel of a face.
+    fn at(&self, face: u32, pixel: [u32; 2]) -> Option<[u8; 3]> {
+        let light = self.light(&self.normal(face, pixel)?);
+        let to_srgb = self.picture.to_srgb;
+        Some([0, 1, 2].map(|c| to_srgb.get(self.albedo[c] * light[c]).round() as u8))
     }
 }

@@ -84,8 +84,6 @@ struct SeenTones {
 /// Own clothes that are to disappear.
 pub(super) struct OwnWorn {
     replaced: Vec<Replaced>,
-    /// Median colour of the face, linear light.
-    pub(super) skin: [f32; 3],
 }
 
 impl OwnWorn {
@@ -100,7 +98,6 @@ impl OwnWorn {
         settings: &OwnClothesSettings,
     ) -> Option<Self> {
         let face_tones: Vec<[f32; 3]> = face.iter().map(|c| tone(*c)).collect();
-        let skin = super::median_light(face)?;
         let tones_of = |is_wanted: &dyn Fn(BodySegment) -> bool| {
             let mut out = SeenTones::default();
             for i in 0..field.cells() {
@@ -148,7 +145,12 @@ impl OwnWorn {
             })
         });
         let replaced: Vec<Replaced> = replaced.collect();
-        (!replaced.is_empty()).then_some(Self { replaced, skin })
+        (!replaced.is_empty()).then_some(Self { replaced })
+    }
+
+    /// A colour is skin's.
+    pub(super) fn is_skin(&self, rgb: [u8; 3]) -> bool {
+        self.replaced.iter().all(|r| r.colors.is_skin(&tone(rgb)))
     }
 
     /// A colour beside or on that segment is one of the own clothes that are to disappear.

@@ -49,7 +49,7 @@ fn own_clothes_become_the_scene_and_sleeves_skin() {
     let captured = pixels_like(scenery.frame.color.as_ref().expect("colour"), RED);
     let (image, report) = draw(&scenery, Some(&empty));
     let told = report.own_clothes.expect("own clothes");
-    // What hangs below the shirt lies on the body and becomes skin.
+    // Own cloth below the shirt lies on the body and becomes skin.
     let (bare, left) = (captured - report.pixels_drawn, pixels_like(&image, RED));
     assert!(left * 10 < bare, "{left} of {bare}, {told:?}");
     assert!(told.by_scene > 1000 && told.by_skin > 3000, "{told:?}");

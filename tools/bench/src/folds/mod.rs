@@ -17,7 +17,7 @@ use poses::FoldPose;
 use std::path::PathBuf;
 use std::time::Instant;
 use tryon::mirror::{DrawnLook, DressedOutfit, library_appearance};
-use tryon::view::{Appearance, GarmentView, SurfacePoint, drawn_normals};
+use tryon::view::{Appearance, DrawnPoint, GarmentView, drawn_normals};
 use tryon_garment::GarmentMesh;
 use tryon_geometry::math::P3;
 
@@ -53,7 +53,7 @@ fn folds(
     };
     let (mut cells, mut ms) = (Vec::new(), 0.0);
     for grid in PanelGrid::of(garment) {
-        let points: Vec<SurfacePoint> = grid.points.iter().flatten().copied().collect();
+        let points: Vec<DrawnPoint> = grid.points.iter().flatten().copied().collect();
         let started = Instant::now();
         let mut normals = drawn_normals(&view, &points, CELL).into_iter();
         ms += started.elapsed().as_secs_f64() * 1e3;

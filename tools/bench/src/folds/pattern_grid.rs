@@ -1,6 +1,6 @@
 //! Regular grids over the panels of a garment, in pattern space: the same cells for every triangulation of a panel.
 
-use tryon::view::SurfacePoint;
+use tryon::view::DrawnPoint;
 use tryon_garment::GarmentMesh;
 
 /// Side of a cell (m): a third of the shortest fold, and a pixel at 1.5 m.
@@ -12,7 +12,7 @@ pub struct PanelGrid {
     /// Cells in a row.
     pub width: usize,
     /// Rows of cells along v, shape `[height · width]`; `None` beside the panel.
-    pub points: Vec<Option<SurfacePoint>>,
+    pub points: Vec<Option<DrawnPoint>>,
 }
 
 /// Cells between two texture coordinates (m), the end excluded.
@@ -68,7 +68,7 @@ impl PanelGrid {
                     let centre = [x, y].map(|i| (i as f32 + 0.5) * CELL);
                     let cell = (y - rows[0]) as usize * width + (x - columns[0]) as usize;
                     if let Some(weights) = weights(*corners, centre) {
-                        points[cell] = Some(SurfacePoint {
+                        points[cell] = Some(DrawnPoint {
                             face: *face,
                             weights,
                         });
