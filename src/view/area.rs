@@ -17,4 +17,10 @@ impl Area {
     pub(crate) fn len(&self) -> usize {
         self.width as usize * self.height as usize
     }
+
+    /// Pixel of the picture at index `i`, row by row.
+    pub(crate) fn pixel(&self, i: usize) -> [u32; 2] {
+        let (x, y) = (i as u32 % self.width, i as u32 / self.width);
+        [self.left + x, self.top + y]
+    }
 }

@@ -75,6 +75,8 @@ settings! {
         pub off_body: f32 = 0.25,
         /// Reach of own clothes off the tracked body across the picture, metres: loose sleeves.
         pub reach: f32 = 0.1,
+        /// Reach of own clothes off the tracked body within which they become skin where the scene was never seen, metres.
+        pub close: f32 = 0.025,
         /// Radius about the head in which hair may fall over clothes, metres.
         pub head: f32 = 0.2,
         /// Share of the clothes' colours below which hair falls over them; above it clothes have its colour.
@@ -83,6 +85,9 @@ settings! {
         pub like_hair: f32 = 0.2,
         /// Tones of clothes looked at, at most.
         pub most_tones: usize = 400,
+        /// Brightness (sRGB) of the clothes' 90th percentile over that of the 10th up to which they are plain: their shades are
+        /// the light's and stay on skin that takes their place.
+        pub plain: f32 = 2.2,
         /// Share of the clothes that looks like skin above which nothing can be told apart.
         pub mixed: f32 = 0.3,
         /// Skin against clothes by colour. Light on arms and legs is not that on the face: chroma tells more than brightness.

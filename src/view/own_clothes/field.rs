@@ -23,6 +23,8 @@ pub(crate) struct BodyField {
     /// Nearest cell on the body, shape `[cells]`; `NONE` beyond the reach.
     nearest: Vec<u32>,
     queue: VecDeque<u32>,
+    /// Focal length, cells.
+    focal: f32,
 }
 
 /// No cell.
@@ -36,6 +38,8 @@ pub(super) struct NearBody {
     pub(super) depth: f32,
     /// The cell itself is on the body.
     pub(super) is_on: bool,
+    /// Distance across the picture, metres.
+    pub(super) beside: f32,
 }
 
 impl BodyField {
@@ -70,11 +74,12 @@ impl BodyField {
         };
         rasterise_with(options, &view, vertices, body.faces, &mut self.drawn);
         (self.width, self.height) = (width as usize, height as usize);
-        self.spread(camera.fx * scale, reach);
+        self.focal = (camera.fx * scale) as f32;
+        self.spread(reach);
     }
 
     /// Breadth first from the body's cells; a cell beside a near part reaches farther than one beside a far part.
-    fn spread(&mut self, focal: f64, reach: f32) {
+    fn spread(&mut self, reach: f32) {
         let on = |i: usize| self.drawn.face[i] != VisibilityBuffer::NONE;
         self.nearest.clear();
         self.nearest
@@ -86,7 +91,7 @@ impl BodyField {
             let (x, y) = (i as usize % self.width, i as usize / self.width);
             let from = self.nearest[i as usize];
             let (fx, fy) = (from as usize % self.width, from as usize / self.width);
-            let radius = focal as f32 * reach / self.drawn.depth[from as usize];
+            let radius = self.focal * reach / self.drawn.depth[from as usize];
             for [dx, dy] in [[0, 1], [1, 0], [0, -1], [-1, 0]] {
                 let (Some(x), Some(y)) = (x.checked_add_signed(dx), y.checked_add_signed(dy))
                 else {
@@ -111,13 +116,37 @@ impl BodyField {
         self.at_cell(i)
     }
 
+    /// Share of the body at a pixel, linear between the middles of cells.
+    pub(super) fn coverage(&self, pixel: [u32; 2]) -> f32 {
+        let stride = self.stride as f32;
+        let at = pixel.map(|p| (p as f32 + 0.5) / stride - 0.5);
+        let low = at.map(f32::floor);
+        let on = |x: f32, y: f32| {
+            let x = (x.max(0.0) as usize).min(self.width - 1);
+            let y = (y.max(0.0) as usize).min(self.height - 1);
+            f32::from(u8::from(
+                self.drawn.face[y * self.width + x] != VisibilityBuffer::NONE,
+            ))
+        };
+        let row = |y: f32| {
+            let [a, b] = [on(low[0], y), on(low[0] + 1.0, y)];
+            a + (b - a) * (at[0] - low[0])
+        };
+        let [a, b] = [row(low[1]), row(low[1] + 1.0)];
+        a + (b - a) * (at[1] - low[1])
+    }
+
     /// The body at or next to a cell.
     pub(super) fn at_cell(&self, i: usize) -> Option<NearBody> {
         let nearest = *self.nearest.get(i).filter(|n| **n != NONE)? as usize;
+        let depth = self.drawn.depth[nearest];
+        let across = [nearest, i].map(|k| ((k % self.width) as f32, (k / self.width) as f32));
+        let cells = (across[0].0 - across[1].0).hypot(across[0].1 - across[1].1);
         Some(NearBody {
             face: self.drawn.face[nearest],
-            depth: self.drawn.depth[nearest],
+            depth,
             is_on: nearest == i,
+            beside: cells * depth / self.focal,
         })
     }
 

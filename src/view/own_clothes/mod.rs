@@ -3,31 +3,31 @@
 
 mod field;
 mod plate;
+mod replacement;
+mod skin_light;
 mod worn;
 
 pub(crate) use field::BodyField;
 pub(crate) use plate::Plate;
 
-use crate::area::{Area, NEAR};
+use crate::area::Area;
 use crate::captured_pixels::CapturedPixels;
 use crate::config::Config;
 use crate::input::BodyView;
 use crate::room_light::RoomLight;
 use crate::settings::OwnClothesSettings;
-use crate::srgb::{ToSrgb, linear};
-use field::{NearBody, normals, segment};
+use crate::srgb::ToSrgb;
+use field::segment;
+use replacement::{Change, Replacement};
 use serde::{Deserialize, Serialize};
+use skin_light::SkinLight;
 use tryon_body::parts::BodySegment;
-use tryon_geometry::math::order_statistics::medians;
 use tryon_geometry::math::{P3, V3};
 use tryon_geometry::par;
-use tryon_geometry::raster::{View, barycentrics};
 use worn::OwnWorn;
 
 /// Rows looked at by one task.
 const ROWS: usize = 8;
-/// Light over the mean on skin below which its colour tells little of it.
-const LEAST_LIGHT: f32 = 0.1;
 
 /// Pixels of own clothes beside garments that take their place.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -38,14 +38,6 @@ pub struct OwnClothesReport {
     pub by_skin: usize,
     /// Left: the scene behind was never seen.
     pub left: usize,
-}
-
-/// New state of a pixel.
-#[derive(Clone, Copy, Debug, PartialEq)]
-enum Change {
-    None,
-    Scene([u8; 3]),
-    Skin([u8; 3]),
 }
 
 /// Pixels of the picture, by index, with their new colours.
@@ -91,6 +83,13 @@ pub(crate) struct DressedPicture<'a> {
     pub(crate) to_srgb: &'a ToSrgb,
 }
 
+impl DressedPicture<'_> {
+    /// Segment that a face of the body belongs to.
+    fn segment(&self, face: u32) -> Option<BodySegment> {
+        segment(&self.body, face)
+    }
+}
+
 impl OwnClothes {
     /// The pixels of own clothes beside garments, as they should be; `None` when no own clothes are to disappear. `cover` is the
     /// share of a pixel that a garment takes.
@@ -121,14 +120,7 @@ impl OwnClothes {
         if !self.is_own.contains(&true) {
             return Some(Default::default());
         }
-        let skin = SkinLight::new(picture, &worn, &self.field);
-        Some(self.changes(picture, skin.as_ref(), &cover))
-    }
-
-    /// Place of a pixel of the window.
-    fn pixel(&self, i: usize) -> [u32; 2] {
-        let (x, y) = (i as u32 % self.window.width, i as u32 / self.window.width);
-        [self.window.left + x, self.window.top + y]
+        Some(self.changes(picture, &worn, &cover))
     }
 
     /// Marks the pixels of own clothes, without lone ones.
@@ -142,7 +134,7 @@ impl OwnClothes {
         let captured = &picture.captured;
         let head = HeadCircle::of(picture, settings.head);
         let is_own = |i: usize| {
-            let pixel @ [u, v] = self.pixel(i);
+            let pixel @ [u, v] = self.window.pixel(i);
             let Some(near) = self.field.at(pixel) else {
                 return false;
             };
@@ -157,7 +149,8 @@ impl OwnClothes {
                 return false;
             }
             let color = captured.image.at(u, v);
-            segment(&picture.body, near.face)
+            picture
+                .segment(near.face)
                 .is_some_and(|segment| worn.is_own(segment, color, head.has(u, v)))
         };
         let (par, width) = (picture.config.par, self.window.width as usize);
@@ -167,27 +160,30 @@ impl OwnClothes {
         self.is_own = marks;
     }
 
+    /// Replaces the marked pixels and those beside them.
     fn changes(
         &self,
         picture: &DressedPicture<'_>,
-        skin: Option<&SkinLight<'_>>,
+        worn: &OwnWorn,
         cover: &impl Fn([u32; 2]) -> f32,
     ) -> (ChangedPixels, OwnClothesReport) {
-        let captured = &picture.captured;
+        let replacement = Replacement {
+            picture,
+            worn,
+            field: &self.field,
+            skin: SkinLight::new(picture, worn, &self.field),
+            is_own: &self.is_own,
+            window: self.window,
+        };
         let (mut out, mut report) = (Vec::new(), OwnClothesReport::default());
-        // Antialiased pixels around own clothes are part of them.
-        let edge = ((2.0 * captured.viewport.scale).ceil() as usize).max(1);
-        let (columns, width) = (captured.image.width() as usize, self.window.width as usize);
+        let columns = picture.captured.image.width() as usize;
         for (i, &is_own) in self.is_own.iter().enumerate() {
-            if !is_own && !is_beside(&self.is_own, width, i, edge) {
-                continue;
-            }
-            let pixel @ [u, v] = self.pixel(i);
-            let Some(near) = self.field.at(pixel) else {
+            let Some(change) = replacement.of(i) else {
                 continue;
             };
-            let seen = usize::from(is_own && cover(pixel) < 0.5);
-            let color = match change(picture, skin, &near, pixel) {
+            let [u, v] = self.window.pixel(i);
+            let seen = usize::from(is_own && cover([u, v]) < 0.5);
+            let color = match change {
                 Change::None => {
                     report.left += seen;
                     continue;
@@ -205,31 +201,6 @@ impl OwnClothes {
         }
         (out, report)
     }
-}
-
-fn change(
-    picture: &DressedPicture<'_>,
-    skin: Option<&SkinLight<'_>>,
-    near: &NearBody,
-    pixel: [u32; 2],
-) -> Change {
-    if near.is_on {
-        let skin = skin.and_then(|s| s.at(near.face, pixel));
-        return skin.map_or(Change::None, Change::Skin);
-    }
-    let scene = picture.plate.at(&picture.captured, pixel);
-    scene.map_or(Change::None, Change::Scene)
-}
-
-/// True with an own pixel within `edge` pixels along the row or the column.
-fn is_beside(is_own: &[bool], width: usize, i: usize, edge: usize) -> bool {
-    let at = |k: Option<usize>| k.and_then(|k| is_own.get(k)).is_some_and(|o| *o);
-    (1..=edge).any(|d| {
-        at(i.checked_sub(d))
-            || at(Some(i + d))
-            || at(i.checked_sub(d * width))
-            || at(Some(i + d * width))
-    })
 }
 
 /// Keeps pixels most of whose neighbours are marked, and fills holes between them.
@@ -286,77 +257,5 @@ impl HeadCircle {
     fn has(&self, u: u32, v: u32) -> bool {
         let [x, y] = [u as f32 - self.centre[0], v as f32 - self.centre[1]];
         x * x + y * y < self.radius * self.radius
-    }
-}
-
-/// Skin of the tracked body in the light of the room.
-struct SkinLight<'a> {
-    picture: &'a DressedPicture<'a>,
-    normals: Vec<V3>,
-    /// Linear light of skin over that which falls on it.
-    albedo: [f32; 3],
-}
-
-impl<'a> SkinLight<'a> {
-    /// Skin like that which is seen on face, arms and hands; `None` of too little.
-    fn new(picture: &'a DressedPicture<'a>, worn: &OwnWorn, field: &BodyField) -> Option<Self> {
-        const LEAST: usize = 12;
-        let unknown = Self {
-            normals: normals(&picture.body, picture.vertices),
-            albedo: [0.0; 3],
-            picture,
-        };
-        let captured = &picture.captured;
-        let on_body = picture.config.own_clothes.on_body;
-        let albedo = |cell: usize| {
-            let near = field.at_cell(cell).filter(|n| n.is_on)?;
-            let segment = segment(&picture.body, near.face)?;
-            use BodySegment::{Fingers, Forearm, Hand, Head, UpperArm};
-            if ![Head, UpperArm, Forearm, Hand, Fingers].contains(&segment) {
-                return None;
-            }
-            let pixel @ [u, v] = field.pixel(cell);
-            let color = captured.image.at(u, v);
-            let metres = captured.metres(u, v);
-            let is_seen = metres > 0.0 && (metres - near.depth).abs() < on_body;
-            if !is_seen || !worn.is_skin(color) {
-                return None;
-            }
-            let light = unknown.light(&unknown.normal(near.face, pixel)?);
-            Some([0, 1, 2].map(|c| linear(color[c]) / light[c].max(LEAST_LIGHT)))
-        };
-        let seen: Vec<[f32; 3]> = (0..field.cells()).filter_map(albedo).collect();
-        let albedo = medians(&seen).filter(|_| seen.len() >= LEAST)?;
-        Some(Self { albedo, ..unknown })
-    }
-
-    /// Unit normal at a pixel of a face.
-    fn normal(&self, face: u32, [u, v]: [u32; 2]) -> Option<V3> {
-        let f = self.picture.body.faces.get(face as usize)?;
-        let corners = f.map(|k| self.picture.vertices[k as usize]);
-        let view = View::Perspective {
-            camera: self.picture.captured.viewport.camera,
-            near: NEAR,
-        };
-        let w = barycentrics(&view, corners, u as f32, v as f32).unwrap_or([1.0 / 3.0; 3]);
-        // A cell's middle may lie beside the face.
-        let w = w.map(|w| w.clamp(0.0, 1.0));
-        let n: V3 = (0..3).map(|k| self.normals[f[k] as usize] * w[k]).sum();
-        n.try_normalize(0.0)
-    }
-
-    /// Light on a surface of normal `n` over the mean, by channel.
-    fn light(&self, n: &V3) -> [f32; 3] {
-        match self.picture.light {
-            Some(room) => room.relative(n),
-            None => [1.0 - 0.5 * n.z; 3],
-        }
-    }
-
-    /// Colour of the body's skin at a pixel of a face.
-    fn at(&self, face: u32, pixel: [u32; 2]) -> Option<[u8; 3]> {
-        let light = self.light(&self.normal(face, pixel)?);
-        let to_srgb = self.picture.to_srgb;
-        Some([0, 1, 2].map(|c| to_srgb.get(self.albedo[c] * light[c]).round() as u8))
     }
 }

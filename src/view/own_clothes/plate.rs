@@ -68,6 +68,17 @@ impl PersonZone {
     }
 }
 
+/// Nearest reading at and around a pixel of a depth image, 0 where one lacks: colours beside an outline are partly the
+/// person's, and both images are aligned within a few pixels.
+fn nearest_around(depth: &[u16], [columns, rows]: [usize; 2], [x, y]: [usize; 2]) -> u16 {
+    const REACH: usize = 3;
+    let [left, top] = [x, y].map(|c| c.saturating_sub(REACH));
+    let [right, bottom] = [(x + REACH).min(columns - 1), (y + REACH).min(rows - 1)];
+    let around = [[x, y], [left, y], [right, y], [x, top], [x, bottom]];
+    let readings = around.map(|[x, y]| depth[y * columns + x]);
+    readings.into_iter().min().unwrap_or(0)
+}
+
 impl Plate {
     /// Learns one in eight rows of an exposure; `vertices` are the tracked body's in the picture's camera.
     pub(crate) fn learn(
@@ -97,14 +108,15 @@ impl Plate {
         let [columns, rows] = captured.viewport.depth.map(|s| s as usize);
         for v in (self.turn..height).step_by(TURNS) {
             for u in 0..width {
-                let reading = captured.depth[v * rows / height * columns + u * columns / width];
+                let at = [u * columns / width, v * rows / height];
                 let person_to = (zone.person_to(u, v, settings.behind) * 1e3) as u16;
-                self.see(
-                    v * width + u,
-                    color.at(u as u32, v as u32),
-                    reading,
-                    person_to,
-                );
+                let reading = if person_to > 0 {
+                    nearest_around(captured.depth, [columns, rows], at)
+                } else {
+                    captured.depth[at[1] * columns + at[0]]
+                };
+                let color = color.at(u as u32, v as u32);
+                self.see(v * width + u, color, reading, person_to);
             }
         }
     }

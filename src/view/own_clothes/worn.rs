@@ -41,6 +41,21 @@ struct Replaced {
     half: Half,
     colors: SkinClassifier,
     beside_head: BesideHead,
+    /// Median brightness of plain cloth; `None` of patterned cloth, whose brightness is not the light's.
+    plain: Option<f32>,
+}
+
+/// Brightness by ITU-R BT.601, 0 to 255.
+fn median_of_plain(tones: &[[f32; 3]], most: f32) -> Option<f32> {
+    let mut brightness: Vec<f32> = tones.iter().map(|t| t[0].max(1.0)).collect();
+    brightness.sort_by(f32::total_cmp);
+    let at = |share: f32| {
+        brightness
+            .get((share * brightness.len() as f32) as usize)
+            .copied()
+    };
+    let [low, middle, high] = [at(0.1)?, at(0.5)?, at(0.9)?];
+    (high < most * low).then_some(middle)
 }
 
 /// Own clothes near the head, where hair falls over them.
@@ -142,6 +157,7 @@ impl OwnWorn {
                 half,
                 colors: SkinClassifier::fit(&face_tones, &tones, &settings.colors)?,
                 beside_head,
+                plain: median_of_plain(&tones, settings.plain),
             })
         });
         let replaced: Vec<Replaced> = replaced.collect();
@@ -151,6 +167,18 @@ impl OwnWorn {
     /// A colour is skin's.
     pub(super) fn is_skin(&self, rgb: [u8; 3]) -> bool {
         self.replaced.iter().all(|r| r.colors.is_skin(&tone(rgb)))
+    }
+
+    /// Light on plain cloth of a colour over the mean light on it, on that segment; `None` where it is patterned.
+    pub(super) fn shade(&self, segment: BodySegment, color: [f32; 3]) -> Option<f32> {
+        /// Least and greatest: stains and buttons are no light.
+        const RANGE: [f32; 2] = [0.45, 1.35];
+        let half = Half::of(segment);
+        let own = self.replaced.iter().find(|r| Some(r.half) == half)?;
+        let linear_light = |c: f32| (c / 255.0).powf(2.2);
+        let [y, ..] = tone(color.map(|c| c as u8));
+        let shade = linear_light(y) / linear_light(own.plain?);
+        Some(shade.clamp(RANGE[0], RANGE[1]))
     }
 
     /// A colour beside or on that segment is one of the own clothes that are to disappear.
