@@ -10,6 +10,7 @@
 //! - Drafts of tops with their sleeves and hoods: [`mod@library::top`].
 //! - Cuts of all of them, ease and lengths: [`mod@library::cuts`].
 //! - Trousers, skirts, dress: [`mod@library::trousers`], [`mod@library::skirt`], [`mod@library::dress`].
+//! - Pockets, buttons, zips: [`mod@trim`], those of the library [`mod@library::trims`].
 //! - Sizes: [`mod@size`].
 //! - GarmentCode: [`mod@import::garmentcode`].
 //! - Coarser meshes of imported garments: [`mod@import::coarsen`].
@@ -31,6 +32,7 @@ mod size;
 mod subdivision;
 mod tensile;
 mod triangulate;
+mod trim;
 
 pub use bending::Bending;
 pub use error::GarmentError;
@@ -46,3 +48,4 @@ pub use size::{BodyMeasures, Size, SizeRow, size_table};
 pub use subdivision::GarmentSubdivision;
 pub use tensile::{CubicTension, Tensile, TensionCurve};
 pub use triangulate::Triangulation;
+pub use trim::{MAX_TRIM_SIDE, MAX_TRIMS, PlacedTrim, Trim, TrimKind};

@@ -1,7 +1,10 @@
 //! Sewn garment: one welded simulation mesh whose triangles keep their flat rest shape.
 
 use super::triangulate::{PanelMesh, Triangulation, triangulate};
-use super::{Anchor, GarmentError, GarmentKind, Material, Panel, Pattern, Placement, Side, Size};
+use super::{
+    Anchor, GarmentError, GarmentKind, Material, Panel, Pattern, PlacedTrim, Placement, Side, Size,
+    Trim,
+};
 use serde::{Deserialize, Serialize};
 use tryon_geometry::math::P3;
 use tryon_geometry::mesh::{Face, Topology, TriMesh, UnionFind};
@@ -109,6 +112,9 @@ pub struct RenderMesh {
     pub uv: Vec<[f32; 2]>,
     /// Triangles over render vertices, in the order of [`GarmentMesh::faces`].
     pub faces: Vec<Face>,
+    /// Pockets, buttons and the like, in texture space.
+    #[serde(default)]
+    pub trims: Vec<PlacedTrim>,
 }
 
 /// Triangles of all garments of an outfit, vertices numbered through.
@@ -269,13 +275,21 @@ impl GarmentMesh {
         };
         let mut offset = 0.0;
         for panel in 0..sewn.meshes.len() {
-            offset = out.add_panel(&sewn, panel, offset);
+            let trims = pattern.trims.iter();
+            let own = trims.filter(|t| t.panel == pattern.panels[panel].name);
+            offset = out.add_panel(&sewn, panel, own, offset);
         }
         out.topology()?;
         Ok(out)
     }
-    /// Adds the triangles of a panel, laid out at `offset` in texture space; returns the offset of the next one, metres.
-    fn add_panel(&mut self, sewn: &Sewn, panel: usize, offset: f64) -> f64 {
+    /// Adds the triangles and trims of a panel, laid out at `offset` in texture space; returns the offset of the next one, metres.
+    fn add_panel<'a>(
+        &mut self,
+        sewn: &Sewn,
+        panel: usize,
+        trims: impl Iterator<Item = &'a Trim>,
+        offset: f64,
+    ) -> f64 {
         let (m, first) = (&sewn.meshes[panel], sewn.first[panel]);
         let lo = m
             .points
@@ -283,6 +297,8 @@ impl GarmentMesh {
             .fold([f64::MAX; 2], |l, p| [l[0].min(p[0]), l[1].min(p[1])]);
         let hi = m.points.iter().map(|p| p[0]).fold(f64::MIN, f64::max);
         let region = Region::of(self.placements[panel]);
+        let moved = [offset - lo[0], -lo[1]];
+        self.render.trims.extend(trims.map(|t| t.placed(moved)));
         for (i, p) in m.points.iter().enumerate() {
             let w = sewn.welded[first + i] as usize;
             let uv = [(p[0] - lo[0] + offset) as f32, (p[1] - lo[1]) as f32];

@@ -1,6 +1,6 @@
 //! A sewing pattern: flat panels, seams, darts and anchors.
 
-use super::{Curve, GarmentError, Material, PanelEdge, Size};
+use super::{Curve, GarmentError, MAX_TRIMS, Material, PanelEdge, Size, Trim};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
 
@@ -141,6 +141,9 @@ pub struct Pattern {
     /// Darts.
     #[serde(default)]
     pub darts: Vec<Dart>,
+    /// Pockets, buttons and other pieces of the look, at most [`MAX_TRIMS`](super::MAX_TRIMS).
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub trims: Vec<Trim>,
     /// Anchors.
     pub anchors: Vec<Anchor>,
     /// Fabric.
@@ -194,6 +197,13 @@ impl Pattern {
     /// Names the panel, edge or seam at fault.
     pub fn check(&self) -> Result<(), GarmentError> {
         self.material.check()?;
+        if self.trims.len() > MAX_TRIMS {
+            return Err(GarmentError::Field {
+                field: "trims".into(),
+                why: format!("{}, at most {MAX_TRIMS}", self.trims.len()),
+            });
+        }
+        (self.trims.iter()).try_for_each(|t| t.check(&self.panels))?;
         if self.panels.is_empty() {
             return Err(GarmentError::Field {
                 field: "panels".into(),

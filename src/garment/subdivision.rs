@@ -126,7 +126,13 @@ fn subdivide_drawn(coarse: &RenderMesh, middles: &mut Middles) -> RenderMesh {
         vertex.push(middles.of(coarse.vertex[a], coarse.vertex[b]));
         uv.push([0, 1].map(|k| 0.5 * (coarse.uv[a][k] + coarse.uv[b][k])));
     }
-    RenderMesh { vertex, uv, faces }
+    let trims = coarse.trims.clone();
+    RenderMesh {
+        vertex,
+        uv,
+        faces,
+        trims,
+    }
 }
 
 #[cfg(test)]

@@ -157,6 +157,7 @@ impl CapturedSurface<'_> {
                 .collect(),
             vertex: atlas.vertex,
             faces: atlas.faces,
+            trims: vec![],
         };
         let image = FabricImage {
             pixels: painted.image().clone(),

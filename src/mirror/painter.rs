@@ -71,7 +71,7 @@ impl OutfitPainter {
         let surfaces = outfit.iter().flat_map(|outfit| {
             (outfit.garments.iter().zip(outfit.looks)).map(|(mesh, look)| DrawnSurface {
                 faces: &mesh.render.faces,
-                uv: &mesh.render.uv,
+                uv: &look.uv,
                 vertex: &mesh.render.vertex,
                 places: &look.places,
                 appearance: &look.appearance,

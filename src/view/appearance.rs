@@ -3,6 +3,7 @@
 use super::cloth::ShadedCloth;
 use super::image_pyramid::ImagePyramid;
 use super::srgb::linear;
+use super::trims::DrawnTrims;
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
@@ -20,6 +21,9 @@ pub struct Appearance {
     /// Yarns, uneven surface and sewn edges; `None` for a smooth sheet.
     #[serde(skip)]
     pub cloth: Option<Arc<ShadedCloth>>,
+    /// Pockets, buttons and the like on it; drawn on cloth only.
+    #[serde(skip)]
+    pub trims: Option<Arc<DrawnTrims>>,
 }
 
 /// A fabric's pattern over its texture coordinates.
@@ -58,6 +62,17 @@ pub enum Print {
     Image(Arc<ImagePyramid>),
 }
 
+impl Print {
+    /// Lengths after which it repeats along u and v, metres; 0 along an axis without a repeat.
+    pub fn period(&self) -> [f32; 2] {
+        match self {
+            Self::Stripes { period, .. } => [0.0, *period],
+            Self::Check { period, .. } => [*period; 2],
+            Self::Solid | Self::Knit { .. } | Self::Scale { .. } | Self::Image(_) => [0.0; 2],
+        }
+    }
+}
+
 impl Default for Appearance {
     fn default() -> Self {
         Self {
@@ -66,6 +81,7 @@ impl Default for Appearance {
             roughness: 0.8,
             metres_per_uv: 1.0,
             cloth: None,
+            trims: None,
         }
     }
 }
@@ -81,6 +97,7 @@ pub(crate) struct Fabric {
     pub(crate) gloss: f32,
     pub(crate) metres_per_uv: f32,
     pub(crate) cloth: Option<Arc<ShadedCloth>>,
+    pub(crate) trims: Option<Arc<DrawnTrims>>,
 }
 
 /// Mean of a square wave (half on) over a pixel of `width` periods centred at `x` periods.
@@ -122,6 +139,7 @@ impl Fabric {
             gloss: (1.0 - appearance.roughness).clamp(0.0, 1.0),
             metres_per_uv: appearance.metres_per_uv,
             cloth: appearance.cloth.clone(),
+            trims: appearance.trims.clone(),
         }
     }
     /// Linear reflectance at a texture coordinate, averaged over a pixel that spans `footprint` metres.

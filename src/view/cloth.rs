@@ -84,6 +84,11 @@ impl ShadedCloth {
         Arc::clone(PREPARED[number].get_or_init(prepare))
     }
 
+    /// Look it was prepared from.
+    pub fn look(&self) -> &FabricLook {
+        &self.look
+    }
+
     /// Prepares a look whose wrinkles are `wave` metres long.
     pub fn new(look: FabricLook, wave: f32) -> Self {
         Self {
@@ -168,7 +173,7 @@ pub(crate) struct ClothNumbers {
     pub(crate) look: [f32; 4],
     /// Wave and place of the puckers at lower and at upper edges, metres.
     pub(crate) pucker: [f32; 4],
-    /// Side of the wrinkles, metres; unused.
+    /// Side of the wrinkles, metres; first relief of the trims and their number; unused.
     pub(crate) wrinkle: [f32; 4],
 }
 

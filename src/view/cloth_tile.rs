@@ -103,7 +103,7 @@ impl ClothTile {
     }
 
     /// From heights (metres) and tones, shape `[n · n]`.
-    fn of(heights: &[f32], tones: &[f32], n: usize, side: f32) -> Self {
+    pub(super) fn of(heights: &[f32], tones: &[f32], n: usize, side: f32) -> Self {
         let at = |x: usize, y: usize| heights[y % n * n + x % n];
         let per_metre = n as f32 / (2.0 * side);
         let texel = |i: usize| {

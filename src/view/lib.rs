@@ -93,6 +93,7 @@ mod matte;
 mod occluder;
 mod off_person;
 mod own_clothes;
+mod print_layout;
 mod render;
 mod report;
 mod room_level;
@@ -106,6 +107,8 @@ mod state;
 pub(crate) mod surface;
 #[cfg(test)]
 pub(crate) mod tests;
+mod trim_relief;
+mod trims;
 mod vertex_shading;
 pub(crate) mod viewport;
 mod workspace;
@@ -120,6 +123,7 @@ pub use input::{BodyView, Framing, GarmentView, Input, OutputFrame, RenderError}
 pub use limbs::Limbs;
 pub use off_person::OffPerson;
 pub use own_clothes::OwnClothesReport;
+pub use print_layout::PrintLayout;
 pub use render::render;
 pub use report::{HandReport, RenderReport};
 pub use room_light::RoomLight;
@@ -129,4 +133,5 @@ pub use settings::{
     SkinSettings,
 };
 pub use state::State;
+pub use trims::DrawnTrims;
 pub use workspace::Workspace;

@@ -87,7 +87,7 @@ settings! {
         pub most_tones: usize = 400,
         /// Brightness (sRGB) of the clothes' 90th percentile over that of the 10th up to which they are plain: their shades are
         /// the light's and stay on skin that takes their place.
-        pub plain: f32 = 2.2,
+        pub plain: f32 = 1.7,
         /// Share of the clothes that looks like skin above which nothing can be told apart.
         pub mixed: f32 = 0.3,
         /// Skin against clothes by colour. Light on arms and legs is not that on the face: chroma tells more than brightness.

@@ -59,6 +59,8 @@ pub(crate) struct ShadedFace {
     /// Gradients of both texture coordinates (metres), of the distance from a free edge and the length along it, and of the
     /// distance from a seam.
     along: [V3; 5],
+    /// Trims near the face, as bits.
+    trims: u32,
 }
 
 impl Default for ShadedFace {
@@ -68,6 +70,7 @@ impl Default for ShadedFace {
             gradient: [V3::zeros(); 3],
             corners: [VertexAttributes::default(); 3],
             along: [V3::zeros(); 5],
+            trims: 0,
         }
     }
 }
@@ -167,7 +170,11 @@ impl<'a> Shader<'a> {
             let sheen = self.sheen(&n, &eye, fabric.gloss);
             return [0, 1, 2].map(|c| self.to_srgb.get((albedo[c] * diffuse + sheen) * gain[c]));
         };
-        let relief = relief(cloth, &attributes, fabric.metres_per_uv, footprint);
+        let mut relief = relief(cloth, &attributes, fabric.metres_per_uv, footprint);
+        if let Some(trims) = fabric.trims.as_ref().filter(|_| cache.trims != 0) {
+            let place = [tu, tv].map(|t| t * fabric.metres_per_uv);
+            trims.add(cache.trims, place, footprint, &mut relief);
+        }
         let tilt = cache.tilt(&relief);
         let n = unit(n - if is_inner { -tilt } else { tilt });
         let albedo = albedo.map(|a| a * relief.tone);
@@ -317,6 +324,9 @@ impl ShadedFace {
         Self {
             face,
             gradient: [b.cross(&c), c.cross(&a), a.cross(&b)],
+            trims: fabric.trims.as_ref().map_or(0, |trims| {
+                trims.near(corners.map(|c| [c[4], c[5]].map(|t| t * fabric.metres_per_uv)))
+            }),
             corners,
             along,
         }

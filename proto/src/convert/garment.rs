@@ -1,12 +1,12 @@
 //! Garment meshes on the wire.
 
-use super::{WireError, bulk, required};
+use super::{WireError, bulk, print, required, trim};
 use crate::v1;
 use std::path::Path;
 use std::sync::Arc;
 use tryon_formats::image::{decode_color, encode_jpeg, encode_png_rgb};
 use tryon_formats::{FormatError, PositionCoder};
-use tryon_garment::FabricImage;
+use tryon_garment::{FabricImage, PlacedTrim};
 use tryon_geometry::math::P3;
 use tryon_geometry::mesh::Face;
 
@@ -41,6 +41,8 @@ pub struct WornGarment {
     pub look: v1::GarmentLook,
     /// Image in place of the colours.
     pub image: Option<Arc<WornImage>>,
+    /// Pockets, buttons and the like.
+    pub trims: Vec<PlacedTrim>,
 }
 
 /// Image of a worn garment, encoded once for all readers.
@@ -134,6 +136,7 @@ pub fn topology_to_wire(g: &WornGarment) -> v1::GarmentTopology {
         drawn_count: g.drawn.len() as u32,
         drawn: bulk::write_flat(&g.drawn),
         texture: g.image.as_ref().map(|i| i.wire.clone()),
+        trims: g.trims.iter().map(trim::to_wire).collect(),
     }
 }
 
@@ -153,12 +156,7 @@ pub fn topology_from_wire(t: &v1::GarmentTopology) -> Result<WornGarment, WireEr
     )?;
     let m = bulk::count("garment_topology.face_count", t.face_count, MAX_FACES)?;
     let look = required(t.look.clone(), "garment_topology.look")?;
-    if !(look.stripe_width.is_finite() && look.stripe_width >= 0.0) {
-        return Err(WireError::new(
-            "garment_topology.look.stripe_width",
-            "must be zero or positive",
-        ));
-    }
+    print::check("garment_topology.look.print", look.print.as_ref())?;
     let k = bulk::count("garment_topology.drawn_count", t.drawn_count, MAX_DRAWN)?;
     let drawn: Vec<u32> = bulk::read::<u32, 1>("garment_topology.drawn", k, &t.drawn)?
         .into_iter()
@@ -176,6 +174,7 @@ pub fn topology_from_wire(t: &v1::GarmentTopology) -> Result<WornGarment, WireEr
         faces: bulk::faces("garment_topology.faces", m, k, &t.faces)?,
         uvs: bulk::read("garment_topology.uvs", k, &t.uvs)?,
         image: image.transpose()?.map(Arc::new),
+        trims: trim::all_from_wire(&t.trims)?,
         drawn,
         look,
     })
@@ -287,13 +286,13 @@ impl GarmentReader {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use tryon_garment::TrimKind;
     use tryon_geometry::camera::ColorImage;
 
     /// Two triangles of two panels that share a seam: four simulated vertices, six drawn ones.
     fn flag() -> WornGarment {
         let look = v1::GarmentLook {
             color_rgb: 0xff0000,
-            accent_rgb: 0xff0000,
             ..Default::default()
         };
         WornGarment {
@@ -312,6 +311,12 @@ mod tests {
             ],
             look,
             image: None,
+            trims: vec![PlacedTrim {
+                kind: TrimKind::Zip,
+                at: [0.5, 0.25],
+                size: [0.02, 0.2],
+                turn: 0.1,
+            }],
         }
     }
 

@@ -12,7 +12,9 @@ pub mod frame;
 pub mod garment;
 pub mod geometry;
 pub mod off_person;
+mod print;
 pub mod request;
 pub mod simulation;
+mod trim;
 
 pub use error::{WireError, required};

@@ -56,6 +56,8 @@ pub fn choices(
         if g.color_rgb.is_some_and(|c| c > 0xff_ff_ff) {
             return fault("color_rgb", "0xRRGGBB, so at most 16777215");
         }
+        let print = format!("{message}.garments[{i}].print");
+        super::print::check(&print, g.print.as_ref())?;
     }
     Ok(garments.to_vec())
 }
@@ -149,6 +151,7 @@ mod tests {
             garment: "tshirt".into(),
             size: "M".into(),
             color_rgb: None,
+            print: None,
         };
         let bad = v1::GarmentChoice {
             color_rgb: Some(0x1_00_00_00),

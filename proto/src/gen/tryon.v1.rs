@@ -122,7 +122,7 @@ pub struct DrapeStep {
     pub settled: bool,
 }
 /// A garment in a size and colour.
-#[derive(Clone, PartialEq, Eq, Hash, ::prost::Message)]
+#[derive(Clone, PartialEq, ::prost::Message)]
 pub struct GarmentChoice {
     /// Name from ListGarments, e.g. "tshirt"; 1 to 64 characters of \[a-z0-9_-\].
     #[prost(string, tag = "1")]
@@ -133,6 +133,21 @@ pub struct GarmentChoice {
     /// sRGB 0xRRGGBB; absent keeps the garment's own colour.
     #[prost(uint32, optional, tag = "3")]
     pub color_rgb: ::core::option::Option<u32>,
+    /// Absent is plain. A garment with an image of its own keeps it unless color_rgb is present.
+    #[prost(message, optional, tag = "4")]
+    pub print: ::core::option::Option<GarmentPrint>,
+}
+/// Printed or woven pattern of a garment, cut so that it meets at seams.
+#[derive(Clone, Copy, PartialEq, ::prost::Message)]
+pub struct GarmentPrint {
+    #[prost(enumeration = "GarmentPrintKind", tag = "1")]
+    pub kind: i32,
+    /// Second colour, sRGB 0xRRGGBB.
+    #[prost(uint32, tag = "2")]
+    pub color_rgb: u32,
+    /// Length of a repeat, metres, 0.005 to 1.
+    #[prost(float, tag = "3")]
+    pub period: f32,
 }
 /// One garment of the library.
 #[derive(Clone, PartialEq, Eq, Hash, ::prost::Message)]
@@ -303,6 +318,37 @@ impl ClothDetail {
             "CLOTH_DETAIL_COARSE" => Some(Self::Coarse),
             "CLOTH_DETAIL_SKINNED" => Some(Self::Skinned),
             "CLOTH_DETAIL_NONE" => Some(Self::None),
+            _ => None,
+        }
+    }
+}
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, ::prost::Enumeration)]
+#[repr(i32)]
+pub enum GarmentPrintKind {
+    Unspecified = 0,
+    /// Bands around the body.
+    Stripes = 1,
+    /// Bands both ways, darker where they cross.
+    Check = 2,
+}
+impl GarmentPrintKind {
+    /// String value of the enum field names used in the ProtoBuf definition.
+    ///
+    /// The values are not transformed in any way and thus are considered stable
+    /// (if the ProtoBuf definition does not change) and safe for programmatic use.
+    pub fn as_str_name(&self) -> &'static str {
+        match self {
+            Self::Unspecified => "GARMENT_PRINT_KIND_UNSPECIFIED",
+            Self::Stripes => "GARMENT_PRINT_KIND_STRIPES",
+            Self::Check => "GARMENT_PRINT_KIND_CHECK",
+        }
+    }
+    /// Creates an enum from field names used in the ProtoBuf definition.
+    pub fn from_str_name(value: &str) -> ::core::option::Option<Self> {
+        match value {
+            "GARMENT_PRINT_KIND_UNSPECIFIED" => Some(Self::Unspecified),
+            "GARMENT_PRINT_KIND_STRIPES" => Some(Self::Stripes),
+            "GARMENT_PRINT_KIND_CHECK" => Some(Self::Check),
             _ => None,
         }
     }
@@ -2651,6 +2697,28 @@ pub struct GarmentTopology {
     /// their normals then. A reader that doesn't know it shows look.
     #[prost(message, optional, tag = "10")]
     pub texture: ::core::option::Option<GarmentTexture>,
+    /// Pockets, buttons and the like, at most 32. A reader may leave them out.
+    #[prost(message, repeated, tag = "11")]
+    pub trims: ::prost::alloc::vec::Vec<GarmentTrim>,
+}
+/// Small piece or stitched line on a garment: it has a look and no mechanics.
+#[derive(Clone, Copy, PartialEq, ::prost::Message)]
+pub struct GarmentTrim {
+    #[prost(enumeration = "GarmentTrimKind", tag = "1")]
+    pub kind: i32,
+    /// Middle, flat panel coordinates as in GarmentTopology.uvs, metres.
+    #[prost(float, tag = "2")]
+    pub at_u: f32,
+    #[prost(float, tag = "3")]
+    pub at_v: f32,
+    /// Sides, metres, more than 0 and up to 1.
+    #[prost(float, tag = "4")]
+    pub width: f32,
+    #[prost(float, tag = "5")]
+    pub height: f32,
+    /// Turn of its frame, counter-clockwise, radians.
+    #[prost(float, tag = "6")]
+    pub turn: f32,
 }
 /// Image on a garment.
 #[derive(Clone, PartialEq, ::prost::Message)]
@@ -2668,15 +2736,12 @@ pub struct GarmentLook {
     /// sRGB 0xRRGGBB.
     #[prost(uint32, tag = "1")]
     pub color_rgb: u32,
-    /// Second colour of a pattern, sRGB 0xRRGGBB; equal to the first means plain.
-    #[prost(uint32, tag = "2")]
-    pub accent_rgb: u32,
-    /// Width of a stripe of the pattern, metres; 0 means plain.
-    #[prost(float, tag = "3")]
-    pub stripe_width: f32,
     /// Name of the fabric, a preset (`jersey`, `denim`, …), for yarns, sheen and sewn edges. Another name looks like jersey.
     #[prost(string, tag = "4")]
     pub fabric: ::prost::alloc::string::String,
+    /// Absent is plain.
+    #[prost(message, optional, tag = "5")]
+    pub print: ::core::option::Option<GarmentPrint>,
 }
 #[derive(Clone, PartialEq, ::prost::Message)]
 pub struct StartSimulationRequest {
@@ -2835,6 +2900,66 @@ impl ClothStatus {
             "CLOTH_STATUS_LIVE" => Some(Self::Live),
             "CLOTH_STATUS_HOLDING" => Some(Self::Holding),
             "CLOTH_STATUS_FAILED" => Some(Self::Failed),
+            _ => None,
+        }
+    }
+}
+/// Frames have x along the width and y along the height, up.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, ::prost::Enumeration)]
+#[repr(i32)]
+pub enum GarmentTrimKind {
+    Unspecified = 0,
+    /// Four holes; its diameter is the width.
+    Button = 1,
+    /// Pointed lower edge, open above.
+    PatchPocket = 2,
+    /// Slanted openings at both upper corners.
+    Pouch = 3,
+    /// Along x, between two turned edges.
+    Slit = 4,
+    /// Along y, its puller above.
+    Zip = 5,
+    /// Double strip along y that carries buttons.
+    Placket = 6,
+    /// Stitches along the right side, rounded to the lower left corner.
+    Fly = 7,
+    /// Narrow strip along y, sewn on at both ends.
+    Loop = 8,
+    /// Hangs along y.
+    Cord = 9,
+}
+impl GarmentTrimKind {
+    /// String value of the enum field names used in the ProtoBuf definition.
+    ///
+    /// The values are not transformed in any way and thus are considered stable
+    /// (if the ProtoBuf definition does not change) and safe for programmatic use.
+    pub fn as_str_name(&self) -> &'static str {
+        match self {
+            Self::Unspecified => "GARMENT_TRIM_KIND_UNSPECIFIED",
+            Self::Button => "GARMENT_TRIM_KIND_BUTTON",
+            Self::PatchPocket => "GARMENT_TRIM_KIND_PATCH_POCKET",
+            Self::Pouch => "GARMENT_TRIM_KIND_POUCH",
+            Self::Slit => "GARMENT_TRIM_KIND_SLIT",
+            Self::Zip => "GARMENT_TRIM_KIND_ZIP",
+            Self::Placket => "GARMENT_TRIM_KIND_PLACKET",
+            Self::Fly => "GARMENT_TRIM_KIND_FLY",
+            Self::Loop => "GARMENT_TRIM_KIND_LOOP",
+            Self::Cord => "GARMENT_TRIM_KIND_CORD",
+        }
+    }
+    /// Creates an enum from field names used in the ProtoBuf definition.
+    pub fn from_str_name(value: &str) -> ::core::option::Option<Self> {
+        match value {
+            "GARMENT_TRIM_KIND_UNSPECIFIED" => Some(Self::Unspecified),
+            "GARMENT_TRIM_KIND_BUTTON" => Some(Self::Button),
+            "GARMENT_TRIM_KIND_PATCH_POCKET" => Some(Self::PatchPocket),
+            "GARMENT_TRIM_KIND_POUCH" => Some(Self::Pouch),
+            "GARMENT_TRIM_KIND_SLIT" => Some(Self::Slit),
+            "GARMENT_TRIM_KIND_ZIP" => Some(Self::Zip),
+            "GARMENT_TRIM_KIND_PLACKET" => Some(Self::Placket),
+            "GARMENT_TRIM_KIND_FLY" => Some(Self::Fly),
+            "GARMENT_TRIM_KIND_LOOP" => Some(Self::Loop),
+            "GARMENT_TRIM_KIND_CORD" => Some(Self::Cord),
             _ => None,
         }
     }

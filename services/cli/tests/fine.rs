@@ -103,6 +103,7 @@ impl Program {
             garment: "skirt".into(),
             size: "M".into(),
             color_rgb: None,
+            print: None,
         };
         let open = OpenTryOnRequest {
             try_on_id: "mine".into(),

@@ -81,6 +81,7 @@ mod tests {
             garment: garment.into(),
             size: size.into(),
             color_rgb: None,
+            print: None,
         }
     }
 

@@ -206,11 +206,11 @@ fn worn_garment(
         uvs: mesh.render.uv.clone(),
         look: v1::GarmentLook {
             color_rgb: color,
-            accent_rgb: color,
-            stripe_width: 0.0,
+            print: choice.print,
             fabric: mesh.material.name.clone(),
         },
         image: image.map(Arc::new),
+        trims: mesh.render.trims.clone(),
     }))
 }
 

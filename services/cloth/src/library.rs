@@ -312,6 +312,7 @@ mod tests {
                 garment: g.name.clone(),
                 size: g.sizes[0].clone(),
                 color_rgb: None,
+                print: None,
             };
             library.check(&[choice]).expect("listed, so known");
         }
@@ -327,6 +328,7 @@ mod tests {
             garment: "tshirt".into(),
             size: "XXXXL".into(),
             color_rgb: None,
+            print: None,
         };
         assert_eq!(
             library.check(&[huge]).expect_err("no such size").field,

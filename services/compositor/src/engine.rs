@@ -190,7 +190,7 @@ impl Worn<'_> {
     fn surface(&self) -> DrawnSurface<'_> {
         let (uv, appearance) = match &self.fit {
             Some((uv, appearance)) => (uv, appearance),
-            None => (&self.garment.uvs, &self.look.appearance),
+            None => (&self.look.uv, &self.look.appearance),
         };
         DrawnSurface {
             faces: &self.garment.faces,

@@ -7,6 +7,7 @@ use tryon::garment::RenderMesh;
 use tryon::mirror::DrawnLook;
 use tryon::view::{Appearance, ImagePyramid, Print};
 use tryon_proto::convert::garment::WornGarment;
+use tryon_proto::v1::{GarmentPrint, GarmentPrintKind};
 
 /// Looks by garment.
 #[derive(Default)]
@@ -55,16 +56,21 @@ fn rgb(c: u32) -> [u8; 3] {
     [r, g, b]
 }
 
+fn print_of(print: &GarmentPrint) -> Print {
+    let (color, period) = (rgb(print.color_rgb), print.period);
+    match print.kind() {
+        GarmentPrintKind::Stripes => Print::Stripes { color, period },
+        GarmentPrintKind::Check => Print::Check { color, period },
+        GarmentPrintKind::Unspecified => Print::Solid,
+    }
+}
+
 fn drawn_look(garment: &WornGarment) -> DrawnLook {
     let look = &garment.look;
-    let is_striped = look.stripe_width > 0.0 && look.accent_rgb != look.color_rgb;
-    let pattern = match &garment.image {
-        Some(image) => Print::Image(Arc::new(ImagePyramid::new(image.image()))),
-        None if is_striped => Print::Stripes {
-            color: rgb(look.accent_rgb),
-            period: 2.0 * look.stripe_width,
-        },
-        None => Print::Solid,
+    let pattern = match (&garment.image, look.print.as_ref()) {
+        (Some(image), _) => Print::Image(Arc::new(ImagePyramid::new(image.image()))),
+        (None, Some(print)) => print_of(print),
+        (None, None) => Print::Solid,
     };
     let appearance = Appearance {
         base: rgb(look.color_rgb),
@@ -75,6 +81,7 @@ fn drawn_look(garment: &WornGarment) -> DrawnLook {
         vertex: garment.drawn.clone(),
         uv: garment.uvs.clone(),
         faces: garment.faces.clone(),
+        trims: garment.trims.clone(),
     };
     DrawnLook::of(&mesh, &look.fabric, appearance)
 }
@@ -99,6 +106,7 @@ mod tests {
                 ..GarmentLook::default()
             },
             image: None,
+            trims: vec![],
         })
     }
 
@@ -117,6 +125,22 @@ mod tests {
             denim.places.iter().all(|p| p.free == 0.0),
             "no edge is sewn"
         );
+    }
+
+    #[test]
+    fn a_print_of_the_stream_is_drawn() {
+        let mut plain = (*garment("cotton")).clone();
+        plain.look.print = Some(GarmentPrint {
+            kind: GarmentPrintKind::Check.into(),
+            color_rgb: 0x00ff_0000,
+            period: 0.05,
+        });
+        let look = Looks::default().of(&Arc::new(plain));
+        let expected = Print::Check {
+            color: [0xff, 0, 0],
+            period: 0.05,
+        };
+        assert_eq!(look.appearance.pattern, expected);
     }
 
     #[test]

@@ -78,10 +78,10 @@ fn square(look: u32) -> WornGarment {
         uvs: vec![[0.0; 2]; 4],
         look: GarmentLook {
             color_rgb: look,
-            accent_rgb: look,
             ..GarmentLook::default()
         },
         image: None,
+        trims: vec![],
     }
 }
 

@@ -280,6 +280,7 @@ fn rebuilt(g: &GarmentMesh, positions: &[P3], c: &Coarsener) -> (GarmentMesh, Ve
             .collect(),
         uv: loose.keys().map(|l| g.render.uv[*l as usize]).collect(),
         faces: kept.iter().map(|k| k.2.map(|l| loose[&l])).collect(),
+        trims: g.render.trims.clone(),
     };
     // Seams: edges between two faces that have no panel's edge in common.
     let edges = |f: &Face| sides(f).map(undirected);

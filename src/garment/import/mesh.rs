@@ -88,6 +88,7 @@ pub fn from_mesh(
             vertex: weld.number,
             uv: render_uv,
             faces: triangles.loose,
+            trims: vec![],
         },
     };
     garment.topology()?;

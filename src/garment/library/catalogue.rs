@@ -1,6 +1,6 @@
 //! Garments by name.
 
-use super::{LibraryCuts, dress, skirt, top, trousers};
+use super::{LibraryCuts, dress, skirt, top, trims, trousers};
 use crate::{GarmentError, Pattern, Size, size_table};
 
 /// Names of all garments, in display order.
@@ -51,7 +51,7 @@ pub fn pattern(name: &str, size: Size) -> Result<Pattern, GarmentError> {
 /// As [`pattern`], and a cut that closes no panel.
 pub fn pattern_with(name: &str, size: Size, cuts: &LibraryCuts) -> Result<Pattern, GarmentError> {
     let row = size_table()[size as usize];
-    let p = match name {
+    let mut p = match name {
         "tshirt" => top::draft(&row, name, "jersey", &cuts.tshirt)?,
         "longsleeve" => top::draft(&row, name, "cotton", &cuts.longsleeve)?,
         "tank" => top::draft(&row, name, "jersey", &cuts.tank)?,
@@ -68,6 +68,7 @@ pub fn pattern_with(name: &str, size: Size, cuts: &LibraryCuts) -> Result<Patter
             });
         }
     };
+    p.trims = trims::of(name, &p.panels);
     p.check()?;
     Ok(p)
 }

@@ -112,6 +112,7 @@ pub(super) fn flared(row: &SizeRow, cut: &DressCut) -> Result<Pattern, GarmentEr
         panels,
         seams,
         darts: darts(&["front", "back"]),
+        trims: vec![],
         anchors: vec![Anchor {
             strength: 0.5,
             ..shoulders()

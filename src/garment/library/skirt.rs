@@ -143,6 +143,7 @@ pub(super) fn straight(row: &SizeRow, cut: &StraightSkirtCut) -> Result<Pattern,
     )?;
     Ok(Pattern {
         darts: darts(&["front", "back"]),
+        trims: vec![],
         ..pattern
     })
 }
@@ -191,6 +192,7 @@ fn finish(
         panels,
         seams,
         darts: vec![],
+        trims: vec![],
         anchors: vec![Anchor {
             name: "waist".into(),
             edges,

@@ -98,6 +98,7 @@ pub(super) fn draft(
         panels,
         seams,
         darts: vec![],
+        trims: vec![],
         anchors: vec![shoulders()],
         material: Material::preset(fabric)?,
         layer: 1,

@@ -94,6 +94,7 @@ pub(super) fn draft(
         size: row.size,
         seams,
         darts: vec![],
+        trims: vec![],
         anchors: vec![Anchor {
             name: "waist".into(),
             edges: waist.collect(),

@@ -2,13 +2,14 @@
 
 use crate::appearance::{Fabric, Print};
 use crate::area::{Area, NEAR};
+use crate::cloth_tile::ClothTexel;
 use crate::contact_shadow::{ContactShadows, NO_SHADOW};
 use crate::coverage::FOLD_GAP;
 use crate::grain::Grain;
 use crate::shading::Shader;
 use crate::surface::Surface;
 use crate::viewport::Viewport;
-use crate::{ImagePyramid, ShadedCloth};
+use crate::{DrawnTrims, ImagePyramid, ShadedCloth};
 use bytemuck::{Pod, Zeroable};
 use std::sync::Arc;
 
@@ -96,6 +97,10 @@ impl FabricData {
         let numbers = f.cloth.as_ref().map(|c| c.numbers());
         let mut numbers = numbers.unwrap_or_default();
         numbers.counts[0] = relief;
+        if let (Some(cloth), Some(trims)) = (&f.cloth, &f.trims) {
+            let first = relief + cloth.texels().count() as u32;
+            numbers.wrinkle[1..3].copy_from_slice(&[first as f32, trims.count() as f32]);
+        }
         let pattern = match &f.print {
             Print::Solid => [0.0, 1.0, 0.0, 0.0],
             &Print::Stripes { period, .. } => [1.0, period, 0.0, 0.0],
@@ -130,9 +135,41 @@ pub(super) fn images(surface: &Surface) -> impl Iterator<Item = &Arc<ImagePyrami
     })
 }
 
-/// Cloths of the fabrics of a surface.
-pub(super) fn cloths(surface: &Surface) -> impl Iterator<Item = &Arc<ShadedCloth>> {
-    surface.fabrics.iter().filter_map(|f| f.cloth.as_ref())
+/// Cloth of a fabric and the trims on it.
+#[derive(Clone, Debug)]
+pub(super) struct FabricReliefs {
+    cloth: Option<Arc<ShadedCloth>>,
+    trims: Option<Arc<DrawnTrims>>,
+}
+
+impl FabricReliefs {
+    /// Both are the same ones.
+    pub(super) fn is(&self, other: &Self) -> bool {
+        fn same<T>(a: &Option<Arc<T>>, b: &Option<Arc<T>>) -> bool {
+            match (a, b) {
+                (Some(a), Some(b)) => Arc::ptr_eq(a, b),
+                (None, None) => true,
+                _ => false,
+            }
+        }
+        same(&self.cloth, &other.cloth) && same(&self.trims, &other.trims)
+    }
+}
+
+impl Fabric {
+    /// Texels of its cloth, then of the trims on it.
+    pub(super) fn reliefs(&self) -> impl Iterator<Item = ClothTexel> + '_ {
+        let trims = self.trims.iter().filter(|_| self.cloth.is_some());
+        (self.cloth.iter().flat_map(|c| c.texels())).chain(trims.flat_map(|t| t.texels()))
+    }
+}
+
+/// Cloths and trims of the fabrics of a surface.
+pub(super) fn fabric_reliefs(surface: &Surface) -> impl Iterator<Item = FabricReliefs> {
+    surface.fabrics.iter().map(|f| FabricReliefs {
+        cloth: f.cloth.clone(),
+        trims: f.trims.clone(),
+    })
 }
 
 /// Flag of an owner seen from inside, above the garment's number.
@@ -157,7 +194,7 @@ pub(super) fn geometry(surface: &Surface) -> [Vec<u8>; 5] {
         .iter()
         .map(|f| {
             let data = FabricData::new(f, first, relief);
-            relief += f.cloth.as_ref().map_or(0, |c| c.texels().count() as u32);
+            relief += f.reliefs().count() as u32;
             if let Print::Image(pyramid) = &f.print {
                 first += pyramid.texels().len() as u32;
             }

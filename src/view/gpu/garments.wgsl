@@ -46,7 +46,7 @@ struct Fabric {
     look: vec4f,
     // Wave and place of puckers at lower and upper edges.
     pucker: vec4f,
-    // Side of the wrinkles, metres.
+    // Side of the wrinkles, metres; first relief of the trims and their number.
     wrinkle: vec4f,
 }
 
@@ -356,6 +356,27 @@ fn relief_of(
     return out;
 }
 
+// Adds trims at a place of the texture (metres).
+fn trim(f: Fabric, uv: vec2f, footprint: f32, out: ptr<function, Relief>) {
+    let first = u32(f.wrinkle.y);
+    let count = u32(f.wrinkle.z);
+    var texel = first + 2u * count;
+    for (var k = 0u; k < count; k++) {
+        let at = reliefs[first + 2u * k];
+        let size = reliefs[first + 2u * k + 1u];
+        let levels = u32(size.w);
+        let d = uv - at.xy;
+        let own = vec2f(at.z * d.x + at.w * d.y, at.z * d.y - at.w * d.x);
+        if abs(own.x) < size.x && abs(own.y) < size.y {
+            let t = tile_nearest(texel, levels, size.z, own + 0.5 * size.z, footprint);
+            (*out).slopes.x += at.z * t.x - at.w * t.y;
+            (*out).slopes.y += at.w * t.x + at.z * t.y;
+            (*out).tone *= 1.0 + t.z;
+        }
+        texel += texels_before(levels, levels);
+    }
+}
+
 fn believed(g: vec3f) -> vec3f {
     return select(g, vec3f(0.0), dot(g, g) > 6.25);
 }
@@ -422,7 +443,8 @@ fn shaded(face: u32, at: vec2f, shadow: f32) -> vec3f {
     if f.cloth.w > 0u {
         let place = attributes[i.x].place * w.x + attributes[i.y].place * w.y + attributes[i.z].place * w.z;
         let m = attributes[i.x].ridges * w.x + attributes[i.y].ridges * w.y + attributes[i.z].ridges * w.z;
-        let relief = relief_of(f, high.xy * f.other.w, high.w, place.x, place.y, place.z > 0.5, m, footprint);
+        var relief = relief_of(f, high.xy * f.other.w, high.w, place.x, place.y, place.z > 0.5, m, footprint);
+        trim(f, high.xy * f.other.w, footprint, &relief);
         let across = cross(b - a, c - a);
         let scale = 1.0 / max(dot(across, across), 1e-38);
         let ga = cross(across, c - b) * scale;

@@ -1,7 +1,7 @@
 //! [`crate::render`] on a graphics card.
 
 use super::adapter::{AdapterReport, GpuError, found, report};
-use super::buffers::{SceneData, cloths, geometry, images, shadow_texels};
+use super::buffers::{FabricReliefs, SceneData, fabric_reliefs, geometry, images, shadow_texels};
 use super::passes::Passes;
 use super::pipelines::{Pipelines, RELIEFS, STORAGE_BUFFERS, TEXELS};
 use super::readback::{COVERAGE_BYTES, fetch, unpack};
@@ -14,8 +14,8 @@ use crate::room_light::RoomLight;
 use crate::shading::Shader;
 use crate::surface::Surface;
 use crate::{
-    Appearance, GarmentView, ImagePyramid, Input, Model, RenderError, RenderReport, ShadedCloth,
-    State, Workspace,
+    Appearance, GarmentView, ImagePyramid, Input, Model, RenderError, RenderReport, State,
+    Workspace,
 };
 use std::sync::{Arc, Mutex};
 use tryon_geometry::camera::{Calibration, ColorImage, DepthImage, Intrinsics, RgbdFrame};
@@ -36,8 +36,8 @@ pub struct Renderer {
     targets: Option<Targets>,
     /// Images in the buffer of texels.
     images: Vec<Arc<ImagePyramid>>,
-    /// Fabrics in the buffer of reliefs.
-    cloths: Vec<Arc<ShadedCloth>>,
+    /// Cloths and trims in the buffer of reliefs.
+    cloths: Vec<FabricReliefs>,
     failure: Failure,
 }
 
@@ -216,13 +216,13 @@ impl Renderer {
 
     /// Uploads yarns, surfaces and edges of the fabrics unless they are those of the last picture.
     fn upload_cloths(&mut self, surface: &Surface) {
-        let is_same = |(a, b): (&Arc<ShadedCloth>, &Arc<ShadedCloth>)| Arc::ptr_eq(a, b);
-        let count = cloths(surface).count();
-        if count == self.cloths.len() && cloths(surface).zip(&self.cloths).all(is_same) {
+        let fabrics: Vec<FabricReliefs> = fabric_reliefs(surface).collect();
+        let mut pairs = fabrics.iter().zip(&self.cloths);
+        if fabrics.len() == self.cloths.len() && pairs.all(|(a, b)| a.is(b)) {
             return;
         }
-        self.cloths = cloths(surface).cloned().collect();
-        let reliefs: Vec<[f32; 4]> = self.cloths.iter().flat_map(|c| c.texels()).collect();
+        self.cloths = fabrics;
+        let reliefs: Vec<[f32; 4]> = surface.fabrics.iter().flat_map(|f| f.reliefs()).collect();
         self.store(RELIEFS, bytemuck::cast_slice(&reliefs));
     }
 
@@ -358,8 +358,8 @@ mod tests {
     use super::*;
     use crate::edge_places;
     use crate::tests::fixture::{RED, SKIN, Scenery, draw};
-    use crate::{Config, Print};
-    use tryon_garment::FabricImage;
+    use crate::{Config, DrawnTrims, Print, ShadedCloth};
+    use tryon_garment::{FabricImage, FabricLook, PlacedTrim, TrimKind};
 
     /// An adapter, or a loud skip; an error when everything is required.
     fn renderer() -> Option<Renderer> {
@@ -449,6 +449,23 @@ mod tests {
         }
     }
 
+    /// A turned slit and a button in the middle of a texture.
+    fn trims_over(uv: &[[f32; 2]]) -> Option<Arc<DrawnTrims>> {
+        let sum = uv.iter().fold([0.0; 2], |s, p| [s[0] + p[0], s[1] + p[1]]);
+        let at = sum.map(|s| s / uv.len() as f32);
+        let trim = |kind, size, turn| PlacedTrim {
+            kind,
+            at,
+            size,
+            turn,
+        };
+        let trims = [
+            trim(TrimKind::Slit, [0.2, 0.05], 0.6),
+            trim(TrimKind::Button, [0.04; 2], 0.0),
+        ];
+        DrawnTrims::new(&trims, &FabricLook::default())
+    }
+
     #[test]
     fn cloth_on_the_card_equals_that_on_the_processor() {
         let Some(mut card) = renderer() else { return };
@@ -457,6 +474,7 @@ mod tests {
         let places = edge_places(&scenery.shirt.faces, &scenery.uv, &vertex);
         for name in ["jersey", "fleece", "denim", "silk"] {
             scenery.appearance.cloth = Some(ShadedCloth::named(name));
+            scenery.appearance.trims = trims_over(&scenery.uv);
             for output in [None, Some([500, 300]), Some([1200, 900])] {
                 let garments = [GarmentView {
                     places: &places,

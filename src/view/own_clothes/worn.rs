@@ -177,7 +177,8 @@ impl OwnWorn {
         let own = self.replaced.iter().find(|r| Some(r.half) == half)?;
         let linear_light = |c: f32| (c / 255.0).powf(2.2);
         let [y, ..] = tone(color.map(|c| c as u8));
-        let shade = linear_light(y) / linear_light(own.plain?);
+        // Half of it, as a logarithm: the rest may be dye.
+        let shade = (linear_light(y) / linear_light(own.plain?)).sqrt();
         Some(shade.clamp(RANGE[0], RANGE[1]))
     }
 

@@ -78,7 +78,7 @@ fn main() {
         .collect();
     let surfaces = (meshes.iter().zip(&looks)).map(|(mesh, look)| DrawnSurface {
         faces: &mesh.render.faces,
-        uv: &mesh.render.uv,
+        uv: &look.uv,
         vertex: &mesh.render.vertex,
         places: &look.places,
         appearance: &look.appearance,

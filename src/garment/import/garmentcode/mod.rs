@@ -62,6 +62,7 @@ pub fn from_garmentcode(
         size,
         seams: seams(raw, &panels, &edge_names),
         darts: vec![],
+        trims: vec![],
         anchors: vec![landmarks::anchor(raw, &drawn, &panels, &edge_names)],
         finished: finished::girths(&panels, &parts, levels),
         material,

@@ -241,6 +241,7 @@ pub fn wear(garments: &[&str]) -> Vec<GarmentChoice> {
             garment: (*g).into(),
             size: "M".into(),
             color_rgb: None,
+            print: None,
         })
         .collect()
 }

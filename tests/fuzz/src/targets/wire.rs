@@ -189,6 +189,7 @@ fn request_seeds() -> Vec<Bundle> {
         garment: "tshirt".into(),
         size: "M".into(),
         color_rgb: Some(0x33_66_99),
+        print: None,
     };
     let open = v1::OpenTryOnRequest {
         try_on_id: "abc-1".into(),
@@ -302,6 +303,7 @@ fn garment_seeds() -> Vec<Bundle> {
             image: super::images::tiny_png().into(),
             metres_per_pixel: 0.01,
         }),
+        trims: vec![],
     };
     let mut coder = tryon::formats::PositionCoder::new(4, &[[0, 1, 2], [1, 3, 2]]);
     let mut bundle = Bundle::default();

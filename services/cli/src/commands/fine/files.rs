@@ -128,6 +128,7 @@ mod tests {
             uvs: vec![[0.0; 2]],
             look: GarmentLook::default(),
             image: None,
+            trims: vec![],
         }
     }
 

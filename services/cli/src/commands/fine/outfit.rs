@@ -95,6 +95,7 @@ pub(super) mod tests {
                 ..Default::default()
             },
             image: None,
+            trims: vec![],
         }
     }
 
