@@ -1,6 +1,6 @@
 //! Person in front of a camera: somebody in everyday clothes, or the display figure of a shop.
 
-use super::settings::FigureSettings;
+use super::settings::{FigureSettings, StreetClothes};
 use std::sync::Arc;
 use tryon_body::{BodyShape, Template};
 
@@ -9,6 +9,8 @@ use tryon_body::{BodyShape, Template};
 pub enum ActorAppearance {
     /// A face, short hair, T-shirt, leggings and shoes in the colours of this number.
     Everyday(u64),
+    /// The same face and hair in other clothes.
+    Street(StreetClothes),
     /// A figure without a face, with a smooth head, hair in a knot and a base layer of tank top and leggings.
     Figure(FigureSettings),
 }

@@ -12,7 +12,7 @@
 //! Evidence:
 //!
 //! - Synthetic people and their truth: [`mod@sequence`], [`mod@routine`], [`mod@posture`], [`mod@room`], drawn by [`mod@room_view`] and [`mod@body_view`].
-//! - Appearance: [`mod@actor`], [`mod@paint`], [`mod@figure`] with [`mod@figure_head`]; [`mod@backdrop`]; light: [`mod@material`],
+//! - Appearance: [`mod@actor`], [`mod@paint`], [`mod@street_clothes`], [`mod@figure`] with [`mod@figure_head`]; [`mod@backdrop`]; light: [`mod@material`],
 //!   [`mod@shadow_map`], [`mod@floor_shadow`].
 #![allow(rustdoc::private_intra_doc_links)] // the index of ideas names private modules
 
@@ -43,6 +43,7 @@ mod shadow_map;
 mod shop;
 mod source;
 mod stance;
+mod street_clothes;
 
 pub use actor::{Actor, ActorAppearance};
 pub use backdrop::Backdrop;
@@ -54,7 +55,9 @@ pub use posture::Posture;
 pub use room::Room;
 pub use routine::Routine;
 pub use sequence::{SeparateColor, Sequence, Setting, Truth};
-pub use settings::{CoveringSettings, FigureSettings, LightSettings, ShopSettings, StanceSettings};
+pub use settings::{
+    CoveringSettings, FigureSettings, LightSettings, ShopSettings, StanceSettings, StreetClothes,
+};
 pub use shop::{PLACES, Shop};
 pub use source::SynthSource;
 pub use tryon_geometry::camera::NoiseModel;

@@ -5,6 +5,8 @@ use super::figure::FigurePaint;
 use super::figure_head::sculpt;
 use super::material::{Exposure, SurfaceMaterial};
 use super::rest_pose::rest_joint;
+use super::settings::StreetClothes;
+use super::street_clothes::put_on_coat;
 use tryon_body::parts::BodySegment;
 use tryon_body::{RestBody, Template};
 use tryon_geometry::math::{P3, P3d, V3};
@@ -49,6 +51,10 @@ impl Paint {
         match appearance {
             ActorAppearance::Everyday(number) => {
                 Self::Everyday(EverydayPaint::new(template, rest, Colors::pick(*number)))
+            }
+            ActorAppearance::Street(clothes) => {
+                put_on_coat(template, rest, clothes);
+                Self::Everyday(EverydayPaint::dressed(template, rest, clothes))
             }
             ActorAppearance::Figure(settings) => {
                 sculpt(template, rest, settings);
@@ -140,11 +146,22 @@ pub(super) struct EverydayPaint {
     size: f32,
     /// Foremost point of the face.
     nose: V3,
-    hips_y: f32,
     ankle_y: f32,
     shoulder: V3,
     elbow: V3,
+    wrist: V3,
+    /// Ends of the sleeves along upper arm and forearm, shares of each.
+    sleeves: [f32; 2],
+    /// Height of the lower end of the top on the trunk, and of a coat on the legs (m).
+    top_end: f32,
+    coat_end: f32,
 }
+
+/// End of short sleeves along the upper arm, and of long ones along the forearm.
+const SHORT_SLEEVE: f32 = 0.55;
+const LONG_SLEEVE: f32 = 0.94;
+/// Height of the top's hem above the hip joints (m).
+const TOP_HEM: f32 = 0.025;
 
 /// Half width of the skull at the ears, metres: skin farther out is ear.
 const EAR: f32 = 0.074;
@@ -184,12 +201,39 @@ impl EverydayPaint {
             size: ((top - head.y) / HEAD_LENGTH).max(f32::EPSILON),
             nose: of_head().filter(|v| v.y > head.y - 0.02).fold(head, front),
             head,
-            hips_y: joint("left_hip").y,
             ankle_y: joint("left_ankle").y,
             shoulder: joint("left_shoulder"),
             elbow: joint("left_elbow"),
+            wrist: joint("left_wrist"),
+            sleeves: [SHORT_SLEEVE, f32::NEG_INFINITY],
+            top_end: joint("left_hip").y + TOP_HEM,
+            coat_end: f32::INFINITY,
             regions,
         }
+    }
+
+    /// Paint of other clothes; `rest` wears the coat.
+    fn dressed(template: &Template, rest: &RestBody, clothes: &StreetClothes) -> Self {
+        let colors = Colors {
+            shirt: clothes.top,
+            legs: clothes.trousers,
+            ..Colors::pick(clothes.person)
+        };
+        let mut out = Self::new(template, rest, colors);
+        if clothes.has_long_sleeves {
+            out.sleeves = [f32::INFINITY, LONG_SLEEVE];
+        }
+        if clothes.coat[1] > 0.0 {
+            out.coat_end = rest_joint(template, rest, "left_knee").y;
+            out.top_end = out.coat_end;
+        }
+        out
+    }
+
+    /// Place along a bone of the left arm, mirrored for the right: 0 at its start, 1 at its end.
+    fn along(&self, p: &P3, [from, to]: [V3; 2]) -> f32 {
+        let d = to - from;
+        (V3::new(p.x.abs(), p.y, p.z) - from).dot(&d) / d.norm_squared()
     }
 
     /// Colour at rest position `p`; `vertex` is one nearby.
@@ -197,15 +241,17 @@ impl EverydayPaint {
         let c = &self.colors;
         match self.regions[vertex as usize] {
             PaintedRegion::Head => self.head_color(p),
-            PaintedRegion::LowerArm => c.skin,
+            PaintedRegion::LowerArm => {
+                let is_sleeve = self.along(p, [self.elbow, self.wrist]) < self.sleeves[1];
+                if is_sleeve { c.shirt } else { c.skin }
+            }
             PaintedRegion::Foot => c.shoes,
             PaintedRegion::Leg if p.y < self.ankle_y + 0.05 => c.shoes,
+            PaintedRegion::Leg if p.y > self.coat_end => c.shirt,
             PaintedRegion::Leg => c.legs,
             PaintedRegion::UpperArm => {
-                let d = self.elbow - self.shoulder;
-                let q = V3::new(p.x.abs(), p.y, p.z) - self.shoulder;
-                let along = q.dot(&d) / d.norm_squared();
-                if along < 0.55 { c.shirt } else { c.skin }
+                let is_sleeve = self.along(p, [self.shoulder, self.elbow]) < self.sleeves[0];
+                if is_sleeve { c.shirt } else { c.skin }
             }
             PaintedRegion::Trunk => {
                 // A round neckline, deeper in front.
@@ -214,7 +260,7 @@ impl EverydayPaint {
                 let line = self.neck.y - depth + 0.9 * (x * x / 0.12);
                 if p.y > line && x.abs() < 0.09 {
                     c.skin
-                } else if p.y < self.hips_y + 0.025 {
+                } else if p.y < self.top_end {
                     c.legs
                 } else {
                     c.shirt

@@ -1,6 +1,7 @@
 //! Physiques far outside the embedded body's shape space: morphs of a base body, bends, bellies and worn coverings.
 
 use super::settings::CoveringSettings;
+use super::street_clothes::coat_thickness;
 use tryon_body::import::template_from_smpl;
 use tryon_body::parts::{BodyPart, BodySegment};
 use tryon_body::{BodyError, BoneTransforms, Pose, RestBody, Template, skin};
@@ -255,12 +256,7 @@ fn cover(template: &Template, covering: Covering) -> Vec<P3> {
         let of = |wanted: &[BodySegment]| body.share(i, |j| wanted.contains(&parts.segment(j)));
         use BodySegment::*;
         match covering {
-            Covering::WideCoat => {
-                let hem = ((p.y - knee.y) / 0.05).clamp(0.0, 1.0);
-                coat[0] * of(&[Pelvis, Abdomen, Chest])
-                    + coat[1] * of(&[Thigh]) * hem
-                    + coat[2] * of(&[Collar, UpperArm, Forearm])
-            }
+            Covering::WideCoat => coat_thickness(template, &rest, i, coat, knee.y),
             Covering::LongHair => {
                 let behind = ((head.z + 0.05 - p.z) / 0.03).clamp(0.0, 1.0);
                 let crown = ((p.y - head.y - 0.11) / 0.03).clamp(0.0, 1.0);

@@ -79,6 +79,20 @@ settings! {
         pub gloss: [f32; 3] = [0.05, 0.0, 0.10],
     }
 
+    /// Own clothes of an everyday person.
+    pub struct StreetClothes {
+        /// Number of the colours of skin and hair.
+        pub person: u64 = 0,
+        /// Colour of top or coat, sRGB.
+        pub top: [u8; 3] = [52, 82, 60],
+        /// Colour of the trousers, sRGB.
+        pub trousers: [u8; 3] = [52, 60, 96],
+        /// Sleeves reach the wrists.
+        pub has_long_sleeves: bool = true,
+        /// Distance from the skin at trunk and hips, thighs, arms (m); a coat that stands off reaches the knees. 0 for none.
+        pub coat: [f32; 3] = [0.0; 3],
+    }
+
     /// Things worn that hide the shape of a body, and its stoop.
     pub struct CoveringSettings {
         /// Share of the stoop that the neck takes.
