@@ -13,7 +13,7 @@ use std::sync::Arc;
 use tryon_body::{BodyShape, Template};
 use tryon_garment::GarmentMesh;
 use tryon_geometry::camera::{Calibration, ColorImage, RgbdFrame};
-use tryon_geometry::math::P3;
+use tryon_geometry::math::{Camera, P3, Rigid, World};
 use tryon_landmarks::Landmarker;
 use tryon_tracking::{COLOR_INTERVAL, ColorEye, Status, TrackerConfig, TrackerModel, TrackerState};
 use tryon_view::{Appearance, ImagePyramid, Print, RenderReport};
@@ -128,6 +128,11 @@ impl Mirror {
     /// Surface of the tracked body, live or not: camera frame, metres.
     pub fn posed_body(&mut self) -> &[P3] {
         self.tracking_work.posed(&self.tracker, &self.tracked).0
+    }
+
+    /// Pose of the camera in the world of the outfit.
+    pub fn world_from_camera(&self) -> Rigid<World, Camera> {
+        self.tracked.world_from_camera
     }
 
     /// Body model.

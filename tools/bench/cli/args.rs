@@ -38,6 +38,8 @@ pub(crate) enum Command {
     Worn(WornArgs),
     /// Folds of drawn garments against the offline solver's in the same pose: energy, direction, places.
     Folds(FoldsArgs),
+    /// The composed picture: borders against truth, shimmer, grain and edges against the photo, own clothes left.
+    Picture(PictureArgs),
     /// Dress bodies and draw each outfit from several sides.
     Turntable(TurntableArgs),
     /// Tracking of everyone who walks in: people, postures and sides from nothing, stills and recordings.
@@ -270,6 +272,30 @@ impl FoldsArgs {
             truth,
         }
     }
+}
+
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Examples:
+  tryon-bench picture --out DIR
+  tryon-bench picture --out DIR --only visibility,shimmer --quick
+  tryon-bench picture --out DIR --only 'own coat' --data ../shared/data")]
+pub(crate) struct PictureArgs {
+    /// Folder for picture.md and picture.json, and one PNG a row to look at.
+    #[arg(long, value_name = "DIR")]
+    pub(crate) out: PathBuf,
+    /// Only rows whose name contains one of these: visibility, shimmer, match, own, a source or a garment.
+    #[arg(long, value_name = "TEXT", value_delimiter = ',')]
+    pub(crate) only: Vec<String>,
+    /// Fewer pictures of each row.
+    #[arg(long)]
+    pub(crate) quick: bool,
+    /// Folder of the shared data; without its recordings their rows are left out.
+    #[arg(long, value_name = "DIR", default_value = "../shared/data")]
+    pub(crate) data: PathBuf,
+    /// Worker threads; 0 means one per core.
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    pub(crate) threads: usize,
 }
 
 #[derive(Debug, Args)]

@@ -25,6 +25,7 @@ fn main() -> ExitCode {
         Command::Standing(a) => measure::standing(&a),
         Command::Worn(a) => measure::worn(&a),
         Command::Folds(a) => measure::folds(&a),
+        Command::Picture(a) => measure::picture(&a),
         Command::People(a) => measure::people(&a),
         Command::Clothcap(a) => measure::clothcap(&a),
         Command::Ccd(a) => ccd::run(&a),

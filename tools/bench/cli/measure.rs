@@ -1,7 +1,8 @@
 //! Tables of run time against error.
 
 use crate::args::{
-    ClothArgs, ClothcapArgs, DanceArgs, FoldsArgs, PeopleArgs, StandingArgs, TrackingArgs, WornArgs,
+    ClothArgs, ClothcapArgs, DanceArgs, FoldsArgs, PeopleArgs, PictureArgs, StandingArgs,
+    TrackingArgs, WornArgs,
 };
 use crate::progress::progress;
 use anyhow::Result;
@@ -17,6 +18,7 @@ use tryon_bench::garment_capture::{
     capture_scenes, made_scenes, measure, measure_turn_scene, turn_scenes,
 };
 use tryon_bench::people;
+use tryon_bench::picture::{PicturePlan, measure_picture};
 use tryon_bench::rest::measure_rest;
 use tryon_bench::worn::{Wearer, WornPicture};
 use tryon_bench::{EvaluateError, OutfitSpec, Table, cloth};
@@ -162,6 +164,25 @@ pub(crate) fn folds(args: &FoldsArgs) -> Result<ExitCode> {
     let table = with_threads(args.threads, || {
         measure_folds(&args.bench(), |row| {
             bar.set_message(format!("{}, {}", row.scene, row.method));
+            bar.inc(1);
+        })
+    })??;
+    bar.finish_and_clear();
+    finish(&table, &args.out)
+}
+
+/// Runs `tryon-bench picture`.
+pub(crate) fn picture(args: &PictureArgs) -> Result<ExitCode> {
+    let plan = PicturePlan {
+        data: args.data.exists().then(|| args.data.clone()),
+        only: args.only.clone(),
+        quick: args.quick,
+        pictures: Some(args.out.clone()),
+    };
+    let bar = progress(None, "measuring");
+    let table = with_threads(args.threads, || {
+        measure_picture(&plan, |row| {
+            bar.set_message(row.scene.clone());
             bar.inc(1);
         })
     })??;

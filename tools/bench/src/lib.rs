@@ -17,6 +17,8 @@
 //! - The dance: [`mod@dance`].
 //! - Outfits worn through motions: [`mod@worn`].
 //! - Folds finer than the simulation against the offline solver's: [`mod@folds`], their measure [`mod@folds::band`].
+//! - The composed picture: [`mod@picture`]; decisions read from it: [`mod@picture::signal`], truth: [`mod@picture::person_truth`],
+//!   measures: [`mod@picture::border`], [`mod@picture::noise`], [`mod@picture::edge_width`].
 //! - Dressed scans with truth per point: [`mod@scans::scene`].
 //! - The embedded body: [`mod@made_body::figure`] (proportions), [`mod@made_body::field`] (surface),
 //!   [`mod@made_body::rig`], [`mod@made_body::directions`] (shape space), [`mod@made_body::statistics`] (published measurements).
@@ -43,6 +45,7 @@ mod outfit;
 pub mod parts;
 pub mod parts_recorded;
 pub mod people;
+pub mod picture;
 pub mod rest;
 pub mod scans;
 pub mod scenes;
