@@ -14,8 +14,6 @@ use tryon_synth::{Actor, ActorAppearance, Routine, Sequence, Setting};
 const OTHER: [u8; 3] = [255, 0, 255];
 /// Greatest difference from the captured pixel at which own cloth is still seen, grey levels of any channel.
 const ALIKE: u8 = 20;
-/// Reach of antialiased pixels around garments, which are left out.
-const EDGE: f32 = 1.5;
 /// Difference at which a pixel that is no own cloth has changed, and the reach of garments' shadows, which are left out.
 const CHANGED: u8 = 10;
 const SHADOW: f32 = 9.0;
@@ -48,6 +46,8 @@ pub(super) struct OwnClothCase {
 struct OwnClothFilm {
     captured: Sequence,
     other: Sequence,
+    /// All clothes are in another colour.
+    all_others: Sequence,
     empty: Option<Sequence>,
 }
 
@@ -73,7 +73,8 @@ impl OwnClothFilm {
         };
         Self {
             captured: film(case.clothes, routine),
-            other: film(recoloured(case.clothes, case.is_lower), routine),
+            other: film(recoloured(case.clothes, &[case.is_lower]), routine),
+            all_others: film(recoloured(case.clothes, &[false, true]), routine),
             empty: (case.seen == SceneSeen::Empty).then(|| film(case.clothes, Routine::Empty)),
         }
     }
@@ -95,29 +96,40 @@ impl OwnClothFilm {
         }
     }
 
-    /// Pixels of the judged clothes in a picture after the lead.
-    fn is_cloth(&self, i: u64, captured: &ColorImage) -> Vec<bool> {
-        let Some(other) = self.other.frame(i - self.lead()).0.color else {
-            return vec![false; captured.data().len() / 3];
+    /// Cloth in a picture after the lead.
+    fn cloth(&self, i: u64, captured: &ColorImage) -> OwnClothMask {
+        let differs = |film: &Sequence| {
+            let Some(other) = film.frame(i - self.lead()).0.color else {
+                return vec![false; captured.data().len() / 3];
+            };
+            let pixels = captured.data().chunks_exact(3);
+            let pairs = pixels.zip(other.data().chunks_exact(3));
+            pairs.map(|(a, b)| a != b).collect()
         };
-        let pairs = captured
-            .data()
-            .chunks_exact(3)
-            .zip(other.data().chunks_exact(3));
-        pairs.map(|(a, b)| a != b).collect()
+        OwnClothMask {
+            judged: differs(&self.other),
+            any: differs(&self.all_others),
+        }
     }
 }
 
-/// The same clothes with the top or the trousers in another colour.
-fn recoloured(mut clothes: ActorAppearance, is_lower: bool) -> ActorAppearance {
-    let color = match &mut clothes {
-        ActorAppearance::Street(c) if is_lower => &mut c.trousers,
-        ActorAppearance::Street(c) => &mut c.top,
-        ActorAppearance::Figure(c) if is_lower => &mut c.leggings,
-        ActorAppearance::Figure(c) => &mut c.top,
-        ActorAppearance::Everyday(_) => return clothes,
-    };
-    *color = OTHER;
+/// Pixels of own cloth by truth.
+struct OwnClothMask {
+    judged: Vec<bool>,
+    any: Vec<bool>,
+}
+
+/// The same clothes with the top, the trousers (`true`) or both in another colour.
+fn recoloured(mut clothes: ActorAppearance, are_lower: &[bool]) -> ActorAppearance {
+    for is_lower in are_lower {
+        let colors = match &mut clothes {
+            ActorAppearance::Street(c) => [&mut c.top, &mut c.trousers],
+            ActorAppearance::Figure(c) => [&mut c.top, &mut c.leggings],
+            ActorAppearance::Everyday(_) => return clothes,
+        };
+        let [upper, lower] = colors;
+        *(if *is_lower { lower } else { upper }) = OTHER;
+    }
     clothes
 }
 
@@ -161,16 +173,16 @@ impl OwnClothCase {
                 continue;
             };
             let cover = painter.cover(&worn, &frame, &scene)?;
-            let is_own = film.is_cloth(i, color);
+            let cloth = film.cloth(i, color);
             let is_garment: Vec<bool> = cover.iter().map(|c| *c > 0.0).collect();
             let width = color.width() as usize;
             let hidden = HiddenPixels {
-                covered: near(&is_garment, width, EDGE),
                 shaded: near(&is_garment, width, SHADOW),
+                covered: is_garment,
             };
-            let left = count.add(color, &seen.picture, &is_own, &hidden);
+            let left = count.add(color, &seen.picture, &cloth, &hidden);
             count.report = added(count.report, seen.render.own_clothes.unwrap_or_default());
-            let marks = (0..is_own.len()).filter(|i| is_own[*i]);
+            let marks = (0..cloth.judged.len()).filter(|i| cloth.judged[*i]);
             let crop = Crop::around(marks, [color.width(), color.height()]);
             gallery.add(color, &crop);
             gallery.add(&seen.picture, &crop);
@@ -199,7 +211,7 @@ impl OwnClothCount {
         &mut self,
         captured: &ColorImage,
         picture: &ColorImage,
-        is_own: &[bool],
+        cloth: &OwnClothMask,
         hidden: &HiddenPixels,
     ) -> ColorImage {
         self.pictures += 1;
@@ -210,14 +222,14 @@ impl OwnClothCount {
             .zip(marked.data_mut().chunks_exact_mut(3));
         for (i, (a, b)) in pixels.enumerate().filter(|(i, _)| !hidden.covered[*i]) {
             let difference = (0..3).map(|c| a[c].abs_diff(b[c])).max().unwrap_or(0);
-            if is_own[i] {
+            if cloth.judged[i] {
                 let is_alike = difference <= ALIKE;
                 self.bare += 1;
                 self.left += usize::from(is_alike);
                 if is_alike {
                     b.copy_from_slice(&FALSE);
                 }
-            } else if difference > CHANGED && !hidden.shaded[i] {
+            } else if difference > CHANGED && !cloth.any[i] && !hidden.shaded[i] {
                 self.harmed += 1;
                 b.copy_from_slice(&MISSED);
             }
@@ -252,12 +264,16 @@ mod tests {
         picture.data_mut()[0..3].copy_from_slice(&[200; 3]);
         picture.data_mut()[9..12].copy_from_slice(&[10; 3]);
         let mut count = OwnClothCount::default();
-        let is_own = [true, true, true, false];
+        let judged = vec![true, true, true, false];
+        let cloth = OwnClothMask {
+            any: judged.clone(),
+            judged,
+        };
         let hidden = HiddenPixels {
             covered: vec![false, false, true, false],
             shaded: vec![false, false, true, false],
         };
-        let marked = count.add(&captured, &picture, &is_own, &hidden);
+        let marked = count.add(&captured, &picture, &cloth, &hidden);
         assert_eq!((count.bare, count.left, count.harmed), (2, 1, 1));
         assert_eq!(marked.at(1, 0), FALSE);
     }
@@ -273,7 +289,7 @@ mod tests {
         let film = OwnClothFilm::new(&case);
         let frame = film.frame(film.lead());
         let color = frame.color.expect("colour");
-        let is_own = film.is_cloth(film.lead(), &color);
+        let is_own = film.cloth(film.lead(), &color).judged;
         let own = is_own.iter().filter(|o| **o).count();
         assert!((5_000..60_000).contains(&own), "{own}");
         let skin = |i: usize| color.data()[3 * i] > 190 && color.data()[3 * i + 2] < 190;

@@ -47,7 +47,7 @@ impl CoveredSkin {
         };
         let place = |(i, p): (usize, &P3)| match () {
             () if covered[i] => SkinPlace::Covered,
-            () if is_dressable(&template, i) && is_beside(p) => SkinPlace::Edge,
+            () if is_beside(p) => SkinPlace::Edge,
             () => SkinPlace::Bare,
         };
         Self(scene.body.iter().enumerate().map(place).collect())
