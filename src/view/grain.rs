@@ -8,22 +8,31 @@ use tryon_geometry::math::order_statistics::median;
 const MEDIAN: f32 = 0.6745;
 const GAIN: f32 = 6.0;
 
+/// Share of red, green and blue in brightness (ITU-R BT.709), and the variance that rounding them to whole levels gives it.
+const LUMA: [f32; 3] = [0.2126, 0.7152, 0.0722];
+const ROUNDING: f32 = 0.0468;
+/// Distance over which a slope is told, pixels.
+const REACH: usize = 2;
+
 /// Standard deviation of the noise of a captured picture where `has_reading` of column and row, grey levels; `None` with too
-/// little to see. The kernel `[1 −2 1; −2 4 −2; 1 −2 1]` takes away everything smooth (Immerkær 1996); the median, edges.
+/// little to see. The kernel `[1 −2 1; −2 4 −2; 1 −2 1]` takes away all that is smooth (Immerkær 1996), the least slopes leave
+/// out hair and fabrics, and the median what is left of edges.
 pub(crate) fn measure(
     image: &ColorImage,
     has_reading: impl Fn(u32, u32) -> bool,
     settings: &GrainSettings,
 ) -> Option<f32> {
     let (width, height) = (image.width() as usize, image.height() as usize);
-    if width < 3 || height < 3 {
+    if width <= 2 * REACH || height <= 2 * REACH {
         return None;
     }
-    // Green stands for brightness.
-    let at = |x: usize, y: usize| f32::from(image.data()[3 * (y * width + x) + 1]);
+    let at = |x: usize, y: usize| {
+        let pixel = &image.data()[3 * (y * width + x)..][..3];
+        (0..3).map(|c| LUMA[c] * f32::from(pixel[c])).sum::<f32>()
+    };
     let mut seen = Vec::new();
-    for y in (1..height - 1).step_by(settings.step) {
-        for x in (1..width - 1).step_by(settings.step) {
+    for y in (REACH..height - REACH).step_by(settings.step) {
+        for x in (REACH..width - REACH).step_by(settings.step) {
             let middle = at(x, y);
             let is_exposed = (settings.exposed[0]..=settings.exposed[1]).contains(&(middle as u8));
             if !is_exposed || !has_reading(x as u32, y as u32) {
@@ -31,11 +40,18 @@ pub(crate) fn measure(
             }
             let sides = at(x - 1, y) + at(x + 1, y) + at(x, y - 1) + at(x, y + 1);
             let corners = at(x - 1, y - 1) + at(x + 1, y - 1) + at(x - 1, y + 1) + at(x + 1, y + 1);
-            seen.push((4.0 * middle - 2.0 * sides + corners).abs());
+            let across = at(x + REACH, y) - at(x - REACH, y);
+            let down = at(x, y + REACH) - at(x, y - REACH);
+            let response = 4.0 * middle - 2.0 * sides + corners;
+            seen.push((across.abs() + down.abs(), response.abs()));
         }
     }
+    seen.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let smooth = (seen.len() as f32 * settings.smooth) as usize;
+    let mut seen: Vec<f32> = seen[..smooth].iter().map(|s| s.1).collect();
     let sigma = (seen.len() >= settings.least).then(|| median(&mut seen))??;
-    Some((sigma / (MEDIAN * GAIN)).min(settings.most))
+    let variance = (sigma / (MEDIAN * GAIN)).powi(2) - ROUNDING;
+    Some(variance.max(0.0).sqrt().min(settings.most))
 }
 
 /// Grain of one picture.

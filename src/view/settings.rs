@@ -130,6 +130,8 @@ settings! {
         pub step: usize = 5,
         /// Fewest pixels of which a grain is told.
         pub least: usize = 200,
+        /// Share of the pixels that are smooth, those of the least slopes. More take fabrics and hair for noise.
+        pub smooth: f32 = 0.4,
         /// Brightness of a usable pixel: below and above it noise is cut off.
         pub exposed: [u8; 2] = [16, 240],
         /// Greatest grain given to garments, grey levels: two pictures of 2 differ by more than 8 in one pixel of 200.
