@@ -1,6 +1,7 @@
 //! Stages shared by the renderers on the processor and on the graphics card: all but rasterisation and shading.
 
 use super::area::Area;
+use super::camera_blur;
 use super::captured::{brightness, captured};
 use super::captured_depth::AreaDepth;
 use super::captured_pixels::CapturedPixels;
@@ -13,18 +14,19 @@ use super::hand::{ArmScene, LayerDepths, PosedLimbs};
 use super::input::{Input, RenderError};
 use super::matte::MatteInput;
 use super::off_person::{OffPerson, OffPersonInput};
+use super::outline_blur::Outlines;
 use super::own_clothes::{DressedPicture, see_face};
 use super::report::{HandReport, RenderReport};
 use super::room_light::RoomLight;
 use super::settings::{BareArmSettings, OffPersonSettings};
 use super::silhouette_grid::DressedArea;
-use super::state::State;
+use super::state::{CameraTraits, State};
 use super::viewport::Viewport;
 use super::workspace::Workspace;
 use std::borrow::Cow;
 use std::time::Instant;
 use tryon_geometry::camera::{ColorImage, DepthImage};
-use tryon_geometry::par;
+use tryon_geometry::par::{self, Par};
 
 /// Side of the tiles that are counted as drawn or skipped, pixels.
 const TILE: u32 = 32;
@@ -164,8 +166,8 @@ impl<'a> Composition<'a> {
         }
     }
 
-    /// Draws the tracked body into `work.body`, and measures light of the room and grain if that is due. Before all that
-    /// depends on either.
+    /// Draws the tracked body into `work.body`, and measures light of the room, grain and blur if that is due. Before
+    /// all that depends on one of them.
     pub(crate) fn see_body(
         &mut self,
         model: &Model,
@@ -232,7 +234,7 @@ impl<'a> Composition<'a> {
         depth
     }
 
-    /// Measures the light of the room and the camera's grain, if that is due.
+    /// Measures the light of the room, and grain and blur of the camera, if that is due.
     fn measure_room(
         &self,
         config: &Config,
@@ -251,8 +253,11 @@ impl<'a> Composition<'a> {
         let vertices = work.body.vertices(input, &body);
         let light = RoomLight::measure(&captured, &body, vertices, config);
         let has_reading = |u, v| captured.metres(u, v) > 0.0;
-        let grain = grain::measure(&self.image, has_reading, &config.grain);
-        state.take_room(light, grain, time_ns, settings);
+        let camera = CameraTraits {
+            grain: grain::measure(&self.image, has_reading, &config.grain),
+            blur: camera_blur::measure(&self.image, has_reading, &config.blur),
+        };
+        state.take_room(light, camera, time_ns, settings);
     }
 
     /// Measures the garments off the person in the picture.
@@ -310,6 +315,18 @@ impl<'a> Composition<'a> {
             },
         };
         work.hands.mark(state, &scene, &mut work.matte.evidence)
+    }
+
+    /// Makes the outlines of the drawn garments as soft as the camera's edges.
+    pub(crate) fn soften_outlines(&mut self, par: Par, blur: f32, work: &Workspace, area: &Area) {
+        let outlines = Outlines {
+            area,
+            pixels: &work.pixels,
+            alpha: &work.matte.alpha,
+            full: (self.samples * self.samples) as u8,
+        };
+        outlines.soften(par, blur, &mut self.image);
+        self.lap("outlines");
     }
 
     /// The picture and its report.

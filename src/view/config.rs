@@ -1,7 +1,7 @@
 //! Settings of the compositor; immutable while a session runs.
 
 use super::settings::{
-    BareArmSettings, ExposureSettings, FocusSettings, GrainSettings, MatteSettings,
+    BareArmSettings, BlurSettings, ExposureSettings, FocusSettings, GrainSettings, MatteSettings,
     OffPersonSettings, OwnClothesSettings, PlateSettings, RoomLevelSettings, RoomLightSettings,
 };
 use super::srgb::ToSrgb;
@@ -97,6 +97,8 @@ pub struct Config {
     pub room_light: RoomLightSettings,
     /// Grain of the camera.
     pub grain: GrainSettings,
+    /// Blur of the camera.
+    pub blur: BlurSettings,
     /// Matte of the captured scene.
     pub matte: MatteSettings,
     /// Bare hands and forearms.
@@ -133,6 +135,7 @@ impl Default for Config {
             room_level: RoomLevelSettings::default(),
             room_light: RoomLightSettings::default(),
             grain: GrainSettings::default(),
+            blur: BlurSettings::default(),
             matte: MatteSettings::default(),
             bare_arms: BareArmSettings::default(),
             off_person: OffPersonSettings::default(),

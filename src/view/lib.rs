@@ -55,6 +55,7 @@
 //! - Bare hands by colour: [`mod@hand::detect`].
 //! - Light: [`mod@shading`], [`mod@contact_shadow`].
 //! - Light of the room, from the captured person: [`mod@room_light`], its level: [`mod@room_level`]. Grain of the camera: [`mod@grain`].
+//! - Blur of the camera: [`mod@camera_blur`], on outlines of garments: [`mod@outline_blur`].
 //! - Fabric colour and prints: [`mod@appearance`]. Yarns and surface: [`mod@cloth_tile`]; both: [`mod@cloth`].
 //! - Seams, hems, ribs: [`mod@construction`], [`mod@edge_profile`].
 //! - Normals of a garment as they are shaded, for judges of folds: [`mod@drawn_normals`].
@@ -68,6 +69,7 @@ pub(crate) mod area;
 mod arm;
 mod blend;
 mod body_depth;
+mod camera_blur;
 mod captured;
 pub(crate) mod captured_depth;
 mod captured_pixels;
@@ -92,6 +94,7 @@ mod limbs;
 mod matte;
 mod occluder;
 mod off_person;
+mod outline_blur;
 mod own_clothes;
 mod print_layout;
 mod render;
@@ -128,9 +131,9 @@ pub use render::render;
 pub use report::{HandReport, RenderReport};
 pub use room_light::RoomLight;
 pub use settings::{
-    BareArmSettings, ExposureSettings, FocusSettings, GrainSettings, LimbSettings, MatteSettings,
-    OffPersonSettings, OwnClothesSettings, PlateSettings, RoomLevelSettings, RoomLightSettings,
-    SkinSettings,
+    BareArmSettings, BlurSettings, ExposureSettings, FocusSettings, GrainSettings, LimbSettings,
+    MatteSettings, OffPersonSettings, OwnClothesSettings, PlateSettings, RoomLevelSettings,
+    RoomLightSettings, SkinSettings,
 };
 pub use state::State;
 pub use trims::DrawnTrims;

@@ -55,5 +55,6 @@ pub fn render(
     };
     blender.blend(config.par, &mut picture.image);
     picture.lap("shading");
+    picture.soften_outlines(config.par, state.blur, work, &area);
     Ok(picture.end(work))
 }

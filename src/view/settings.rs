@@ -138,6 +138,20 @@ settings! {
         pub most: f32 = 2.0,
     }
 
+    /// Settings of the camera's blur.
+    pub struct BlurSettings {
+        /// Rows and columns between two looked at.
+        pub step: usize = 4,
+        /// Fewest edges of which a blur is told.
+        pub least: usize = 100,
+        /// Least slope of an edge, grey levels a pixel: less is shading and noise.
+        pub steep: f32 = 12.0,
+        /// Slope along an edge over that across it above which it is slanted and looks wider.
+        pub slanted: f32 = 0.4,
+        /// Greatest blur given to garments, pixels: more is motion.
+        pub most: f32 = 1.2,
+    }
+
     /// Settings of the matte of the captured scene over the garments.
     pub struct MatteSettings {
         /// Distance from a patch's edge at which depths are compared, depth pixels: flying pixels lie in between.

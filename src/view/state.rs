@@ -1,5 +1,5 @@
-//! Memory between pictures: colours of one user's skin and clothes, light of the room, grain of the camera, times of the last
-//! measurements.
+//! Memory between pictures: colours of one user's skin and clothes, light of the room, grain and blur of the camera, times of
+//! the last measurements.
 
 use super::focus::Focus;
 use super::grain::Grain;
@@ -36,9 +36,21 @@ pub struct State {
     /// Grain of the camera, grey levels.
     #[serde(default)]
     grain: f32,
+    /// Blur of the camera, pixels.
+    #[serde(default)]
+    pub(super) blur: f32,
     /// Capture time of the last measurement of both, nanoseconds; `None` = never.
     #[serde(default)]
     room_ns: Option<u64>,
+}
+
+/// Measured traits of the camera's picture.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct CameraTraits {
+    /// Standard deviation of the noise, grey levels.
+    pub(super) grain: Option<f32>,
+    /// Standard deviation of the blur, pixels.
+    pub(super) blur: Option<f32>,
 }
 
 /// Region of the body a colour was taken from.
@@ -65,6 +77,7 @@ impl State {
                 plate: std::mem::take(&mut self.plate),
                 room_light: self.room_light,
                 grain: self.grain,
+                blur: self.blur,
                 room_ns: self.room_ns,
                 ..Self::default()
             };
@@ -95,11 +108,11 @@ impl State {
         }
     }
 
-    /// Takes a measured light of the room and a grain, each where there is one.
+    /// Takes a measured light of the room, and grain and blur of the camera, each where there is one.
     pub(super) fn take_room(
         &mut self,
         light: Option<RoomLight>,
-        grain: Option<f32>,
+        camera: CameraTraits,
         time_ns: u64,
         settings: &RoomLightSettings,
     ) {
@@ -109,8 +122,12 @@ impl State {
             let old = self.room_light.unwrap_or(new);
             self.room_light = Some(old.toward(&new, passed, settings));
         }
-        if let Some(new) = grain {
-            self.grain += (new - self.grain) * settings.share(passed);
+        let share = settings.share(passed);
+        for (kept, new) in [
+            (&mut self.grain, camera.grain),
+            (&mut self.blur, camera.blur),
+        ] {
+            *kept += (new.unwrap_or(*kept) - *kept) * share;
         }
         self.room_ns = Some(time_ns);
     }

@@ -171,6 +171,7 @@ impl Renderer {
         self.upload_visibility(&passes, work, &depth);
         self.shade(&passes, &mut picture.image)?;
         picture.lap("shading");
+        picture.soften_outlines(model.config.par, state.blur, work, &area);
         self.targets = Some(targets);
         match self.failure.lock().ok().and_then(|mut f| f.take()) {
             Some(why) => Err(RenderError::Graphics(why)),
