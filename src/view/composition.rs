@@ -214,6 +214,8 @@ impl<'a> Composition<'a> {
             distance: work.surface.distance,
             guide: &self.image,
             depth: &depth.metres,
+            pixels: &work.pixels,
+            inner: &work.surface.inner,
         });
         self.lap("visibility");
         if is_tracked && config.own_clothes.are_removed {

@@ -2,6 +2,7 @@
 
 use super::area::Area;
 use super::config::Margins;
+use super::coverage::PixelCoverage;
 use super::evidence::Evidence;
 use super::occluder::{FloodScratch, PatchCriteria, drop_specks};
 use super::settings::MatteSettings;
@@ -41,6 +42,9 @@ pub(crate) struct MatteInput<'a> {
     pub(crate) guide: &'a ColorImage,
     /// Captured depth, metres, 0 = none; shape `[area]`.
     pub(crate) depth: &'a [f32],
+    /// Coverage of each pixel, shape `[area]`, and the faces that are seen from inside.
+    pub(crate) pixels: &'a [PixelCoverage],
+    pub(crate) inner: &'a [bool],
 }
 
 impl Matte {
@@ -79,6 +83,10 @@ struct SoftEdge<'a> {
     radius: i32,
     stride: usize,
     certain_share: f32,
+    pixels: &'a [PixelCoverage],
+    inner: &'a [bool],
+    /// Depth between two sheets of cloth, metres.
+    sheets_apart: f32,
     /// Weight by colour difference.
     weights: Vec<f32>,
 }
@@ -94,6 +102,9 @@ impl<'a> SoftEdge<'a> {
             guide: input.guide,
             radius,
             certain_share: input.settings.certain_share,
+            pixels: input.pixels,
+            inner: input.inner,
+            sheets_apart: input.settings.sheets_apart,
             stride: if radius > DENSE_RADIUS { 2 } else { 1 },
             weights: (0..=MAX_DIFFERENCE)
                 .map(|d| (-(d as f32 / input.settings.color_scale).powi(2)).exp())
@@ -116,6 +127,14 @@ impl<'a> SoftEdge<'a> {
         }
     }
 
+    /// Two pixels show one sheet of cloth. At the end of a sheet, a hem or collar before what is inside, evidence changes with
+    /// the garment, not with the captured picture.
+    fn is_one_sheet(&self, i: usize, k: usize) -> bool {
+        let (a, b) = (&self.pixels[i], &self.pixels[k]);
+        let side = |p: &PixelCoverage| self.inner.get(p.face as usize);
+        side(a) == side(b) && (a.depth - b.depth).abs() < self.sheets_apart
+    }
+
     fn position(&self, i: usize) -> [i32; 2] {
         let width = self.area.width as i32;
         [i as i32 % width, i as i32 / width]
@@ -129,9 +148,12 @@ impl<'a> SoftEdge<'a> {
         for dy in [-self.radius, 0, self.radius] {
             let row = (y + dy).clamp(0, height - 1) * width;
             for dx in [-self.radius, 0, self.radius] {
-                let e = self.evidence[(row + (x + dx).clamp(0, width - 1)) as usize];
-                front |= e.is_front();
-                garment |= e == Evidence::Garment;
+                let k = (row + (x + dx).clamp(0, width - 1)) as usize;
+                let e = self.evidence[k];
+                if e >= Evidence::Garment && self.is_one_sheet(i, k) {
+                    front |= e.is_front();
+                    garment |= e == Evidence::Garment;
+                }
             }
         }
         front && garment
@@ -153,8 +175,9 @@ impl<'a> SoftEdge<'a> {
                 if u < 0 || v < 0 || u >= width || v >= height {
                     continue;
                 }
-                let e = self.evidence[(v * width + u) as usize];
-                if e < Evidence::Garment {
+                let k = (v * width + u) as usize;
+                let e = self.evidence[k];
+                if e < Evidence::Garment || !self.is_one_sheet(i, k) {
                     continue;
                 }
                 let c = self.color(u, v);

@@ -160,6 +160,8 @@ settings! {
         pub color_scale: f32 = 48.0,
         /// Radius of the soft edge in depth pixels: the misalignment of depth and colour edges that it must bridge.
         pub edge_radius: f64 = 3.0,
+        /// Depth between two sheets of cloth, metres: neighbours on another sheet have no vote. Less splits steep folds.
+        pub sheets_apart: f32 = 0.05,
         /// Vote share that maps to 0; one minus it maps to 1. Sharpens: half-way votes are edges, not transparent arms.
         pub certain_share: f32 = 0.25,
     }
