@@ -32,6 +32,8 @@ pub(super) enum SceneSeen {
     Empty,
     /// As the person walked.
     Walked,
+    /// Beside arms that moved.
+    TriedOn,
 }
 
 pub(super) struct OwnClothCase {
@@ -55,6 +57,7 @@ impl OwnClothFilm {
     fn new(case: &OwnClothCase) -> Self {
         let routine = match case.seen {
             SceneSeen::Walked => Routine::Walk,
+            SceneSeen::TriedOn => Routine::TryOn,
             SceneSeen::Never | SceneSeen::Empty => Routine::Still,
         };
         let film = |appearance: ActorAppearance, routine: Routine| {
@@ -162,6 +165,7 @@ impl OwnClothCase {
             (film.captured.setting().routine.period() * film.captured.setting().rate) as u64;
         let (start, length) = match self.seen {
             SceneSeen::Walked => (period / 2, period + STEP),
+            SceneSeen::TriedOn => (SETTLED, period),
             _ => (SETTLED, SETTLED + 5 * STEP),
         };
         for i in 0..film.lead() + length {

@@ -105,16 +105,25 @@ fn own_cloth_cases() -> impl Iterator<Item = (String, Case)> {
     };
     let street = ActorAppearance::Street;
     let figure = ActorAppearance::Figure(FigureSettings::default());
+    // Colours of everyday people, the top's near those of skin in the shade.
+    let short = StreetClothes {
+        top: [150, 154, 160],
+        trousers: [46, 48, 56],
+        has_long_sleeves: false,
+        ..plain
+    };
     let clothes = [
         ("sleeves", street(plain), TOP),
         ("trousers", street(plain), OUTFIT),
         ("coat", street(coat), OUTFIT),
         ("figure's leggings", figure, OUTFIT),
+        ("short sleeves' trousers", street(short), OUTFIT),
     ];
     let seen = [
         ("never seen", SceneSeen::Never),
         ("seen empty", SceneSeen::Empty),
         ("walked", SceneSeen::Walked),
+        ("tried on", SceneSeen::TriedOn),
     ];
     clothes
         .into_iter()
@@ -122,11 +131,11 @@ fn own_cloth_cases() -> impl Iterator<Item = (String, Case)> {
             seen.into_iter().map(move |(how, seen)| {
                 let case = OwnClothCase {
                     clothes,
-                    is_lower: ["trousers", "figure's leggings"].contains(&name),
+                    is_lower: name.ends_with("trousers") || name.ends_with("leggings"),
                     garments,
                     seen,
                 };
-                (format!("own {name}, scene {how}"), Case::OwnCloth(case))
+                (format!("own {name}: scene {how}"), Case::OwnCloth(case))
             })
         })
 }

@@ -44,11 +44,14 @@ impl VisibilityCase {
         for i in 0..pictures {
             let (frame, person) = sequence.frame(i);
             let seen = film.step(&frame)?;
-            let Some(scene) = film.scene().filter(|_| seen.is_dressed && i % STEP == 0) else {
+            let Some(scene) = film
+                .scene()
+                .filter(|_| seen.is_dressed && i.is_multiple_of(STEP))
+            else {
                 continue;
             };
             let cover = painter.cover(&film, &frame, &scene)?;
-            if i < SETTLED || i % judged_every != 0 {
+            if i < SETTLED || !i.is_multiple_of(judged_every) {
                 continue;
             }
             let covered = covered.get_or_insert_with(|| CoveredSkin::of(&scene));
@@ -121,7 +124,7 @@ impl Scores {
         if is_worst {
             self.worst = all.f1();
         }
-        is_worst || self.pictures % 10 == 0
+        is_worst || self.pictures.is_multiple_of(10)
     }
 
     fn add_to(&self, row: Row) -> Row {
