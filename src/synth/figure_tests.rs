@@ -7,7 +7,7 @@ use tryon_geometry::math::V3;
 
 /// A figure's rest body and paint.
 fn figure() -> (RestBody, FigurePaint) {
-    let sequence = Sequence::new(Actor::figure(), Setting::studio().with_wide_color());
+    let sequence = Sequence::new(Actor::figure(), Setting::studio().with_wide_color(720));
     let rest = sequence.rest().clone();
     let paint = FigurePaint::new(&embedded::template(), &rest, &FigureSettings::default());
     (rest, paint)
@@ -71,7 +71,7 @@ fn base_layer_and_hair_are_where_they_belong() {
 fn truth_of_a_figure_is_the_surface_that_the_cameras_see() {
     let setting = Setting {
         noise: NoiseModel::None,
-        ..Setting::studio().with_wide_color()
+        ..Setting::studio().with_wide_color(720)
     };
     let sequence = Sequence::new(Actor::figure(), setting);
     let template = embedded::template();
@@ -102,7 +102,7 @@ fn samples_soften_edges_only() {
                 samples,
                 grain: 0.0,
             },
-            ..Setting::studio().with_wide_color()
+            ..Setting::studio().with_wide_color(720)
         };
         let (frame, _) = Sequence::new(Actor::figure(), setting).frame(0);
         frame.color.expect("colour")

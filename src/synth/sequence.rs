@@ -79,9 +79,6 @@ impl Default for Setting {
     }
 }
 
-/// Columns and rows of a wide colour camera.
-const WIDE: [u32; 2] = [1280, 720];
-
 impl Setting {
     /// A studio with the camera of the default, soft edges and a little grain.
     pub fn studio() -> Self {
@@ -95,17 +92,18 @@ impl Setting {
         }
     }
 
-    /// The same setting with a colour camera of 1280×720 in the place of the depth camera, as tall a view and wider.
+    /// The same setting with a colour camera of 16:9 in the place of the depth camera, `rows` high, as tall a view and wider.
     #[must_use]
-    pub fn with_wide_color(self) -> Self {
+    pub fn with_wide_color(self, rows: u32) -> Self {
         let depth = self.camera;
-        let zoom = f64::from(WIDE[1]) / f64::from(depth.height);
+        let zoom = f64::from(rows) / f64::from(depth.height);
+        let columns = rows * 16 / 9;
         let camera = Intrinsics {
-            width: WIDE[0],
-            height: WIDE[1],
+            width: columns,
+            height: rows,
             fx: zoom * depth.fx,
             fy: zoom * depth.fy,
-            cx: 0.5 * f64::from(WIDE[0] - 1),
+            cx: 0.5 * f64::from(columns - 1),
             cy: zoom * (depth.cy + 0.5) - 0.5,
         };
         let color_camera = Some(SeparateColor {

@@ -195,7 +195,7 @@ fn pictures_of_numbered_people_stay_the_same() {
 /// The studio's floor is the plane on which the figure stands, in depth as in its shadow.
 #[test]
 fn floor_of_the_studio_is_a_plane_and_darkens_under_the_feet() {
-    let s = Sequence::new(Actor::figure(), Setting::studio().with_wide_color());
+    let s = Sequence::new(Actor::figure(), Setting::studio().with_wide_color(720));
     let (k, world) = (s.setting().camera, s.setting().world_from_camera);
     let empty = s.view.empty_depth();
     let height = |u: u32, v: u32| {
@@ -210,7 +210,7 @@ fn floor_of_the_studio_is_a_plane_and_darkens_under_the_feet() {
 
     let nobody = Setting {
         routine: Routine::Empty,
-        ..Setting::studio().with_wide_color()
+        ..Setting::studio().with_wide_color(720)
     };
     let nobody = Sequence::new(Actor::figure(), nobody).frame(0).0.color;
     let (somebody, bare) = (s.frame(0).0.color.expect("colour"), nobody.expect("colour"));

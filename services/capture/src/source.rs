@@ -147,10 +147,8 @@ fn kind(name: &str) -> Result<SourceKind<'_>, SourceError> {
         _ if is_push(name) => Ok(SourceKind::Push),
         ("synth", clip) => performing(name, clip, Setting::default()).map(SourceKind::Synth),
         ("studio", clip) => performing(name, clip, Setting::studio()).map(SourceKind::Studio),
-        ("studio-720", clip) => {
-            let setting = Setting::studio().with_wide_color();
-            performing(name, clip, setting).map(SourceKind::Studio)
-        }
+        ("studio-720", clip) => wide_studio(name, clip, 720),
+        ("studio-1080", clip) => wide_studio(name, clip, 1080),
         _ if is_device(name) => Ok(SourceKind::Device),
         _ => Ok(SourceKind::Recording(Path::new(name))),
     }
@@ -201,6 +199,12 @@ fn performing(name: &str, clip: &str, setting: Setting) -> Result<Box<Setting>, 
     Ok(Box::new(Setting { routine, ..setting }))
 }
 
+/// The display figure before a colour camera of 16:9.
+fn wide_studio<'a>(name: &'a str, clip: &str, rows: u32) -> Result<SourceKind<'a>, SourceError> {
+    let setting = Setting::studio().with_wide_color(rows);
+    performing(name, clip, setting).map(SourceKind::Studio)
+}
+
 /// A synthetic person, without end.
 fn synth(actor: Actor, setting: Setting) -> OpenSource {
     Box::new(SynthSource::new(Sequence::new(actor, setting), None))
@@ -215,7 +219,11 @@ mod tests {
         let mut s = open("pattern").expect("always there");
         let f = s.next_frame().expect("fine").expect("never ends");
         assert_eq!(f.depth.width(), s.calibration().depth.width);
-        for (source, size) in [("studio", (640, 480)), ("studio-720:still", (1280, 720))] {
+        for (source, size) in [
+            ("studio", (640, 480)),
+            ("studio-720:still", (1280, 720)),
+            ("studio-1080", (1920, 1080)),
+        ] {
             let mut studio = open(source).expect("always there");
             let frame = studio.next_frame().expect("fine").expect("never ends");
             let color = frame.color.map(|c| (c.width(), c.height()));

@@ -72,11 +72,16 @@ impl PersonZone {
 /// person's, and both images are aligned within a few pixels.
 fn nearest_around(depth: &[u16], [columns, rows]: [usize; 2], [x, y]: [usize; 2]) -> u16 {
     const REACH: usize = 3;
-    let [left, top] = [x, y].map(|c| c.saturating_sub(REACH));
-    let [right, bottom] = [(x + REACH).min(columns - 1), (y + REACH).min(rows - 1)];
-    let around = [[x, y], [left, y], [right, y], [x, top], [x, bottom]];
-    let readings = around.map(|[x, y]| depth[y * columns + x]);
-    readings.into_iter().min().unwrap_or(0)
+    let at = |x: usize, y: usize| depth[y.min(rows - 1) * columns + x.min(columns - 1)];
+    let beside = (1..=REACH).flat_map(|d| {
+        [
+            at(x.saturating_sub(d), y),
+            at(x + d, y),
+            at(x, y.saturating_sub(d)),
+            at(x, y + d),
+        ]
+    });
+    beside.fold(at(x, y), u16::min)
 }
 
 impl Plate {
@@ -211,5 +216,20 @@ mod tests {
         assert_eq!((plate.color[0], plate.depth[0]), (WALL, FAR));
         plate.see(0, WALL, 3000, 0);
         assert_eq!(plate.depth[0], 3000);
+    }
+
+    #[test]
+    fn around_the_person_the_nearest_reading_counts() {
+        // Somebody 2 m away in the middle column, a wall at 3 m, a gap in the last column.
+        let depth: Vec<u16> = (0..11 * 9)
+            .map(|i| match i % 11 {
+                5 => 2000,
+                10 => 0,
+                _ => 3000,
+            })
+            .collect();
+        let at = |x: usize| nearest_around(&depth, [11, 9], [x, 4]);
+        assert_eq!([0, 1, 2, 5, 6].map(at), [3000, 3000, 2000, 2000, 2000]);
+        assert_eq!(at(8), 0, "no reading beside");
     }
 }

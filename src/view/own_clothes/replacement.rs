@@ -124,9 +124,11 @@ impl Replacement<'_> {
         }
     }
 
-    /// Reach of an antialiased edge, pixels of the picture.
+    /// Reach of an edge, pixels of the picture: it is antialiased, and readings of depth end up to a pixel of theirs beside it.
     fn edge_width(&self) -> isize {
-        (2.0 * self.picture.captured.viewport.scale).ceil().max(1.0) as isize
+        let viewport = self.picture.captured.viewport;
+        let reading = f64::from(viewport.camera.height) / f64::from(viewport.depth[1]);
+        (2.0 * viewport.scale.max(reading)).ceil().max(1.0) as isize
     }
 
     /// Colour of skin in the place of cloth of this colour.

@@ -206,7 +206,7 @@ settings! {
     pub struct CameraConfig {
         /// Camera part of the bus keys.
         pub name: String = "front".into(),
-        /// `studio`, `studio-720`, `synth`, `synth:CLIP`, `pattern` (a test picture), `push` (a program feeds it), `ros2:DEPTH_TOPIC,COLOR_TOPIC` (the
+        /// `studio`, `studio-720`, `studio-1080`, `synth`, `synth:CLIP`, `pattern` (a test picture), `push` (a program feeds it), `ros2:DEPTH_TOPIC,COLOR_TOPIC` (the
         /// second may be left out), a device as `freenect:SERIAL`, `openni:SERIAL` or `v4l2:SERIAL`, or the path of a recording.
         pub source: String = "studio".into(),
         /// `camera.json` of a device or recording that has no calibration of its own; empty for its own.

@@ -29,7 +29,7 @@ impl VisibilityCase {
     pub(super) fn measure(&self, progress: &Progress<'_>) -> Result<Row, EvaluateError> {
         let (actor, setting) = self.look.scene(Routine::TryOn);
         let rate = setting.rate;
-        let sequence = Sequence::new(actor, setting.with_wide_color());
+        let sequence = Sequence::new(actor, setting.with_wide_color(720));
         let mut film = WornFilm::new(sequence.calibration(), self.garments)?;
         let mut painter = SignalPainter::new();
         let pictures = (Routine::TryOn.period() * rate) as u64;
