@@ -203,7 +203,8 @@ impl Pattern {
                 why: format!("{}, at most {MAX_TRIMS}", self.trims.len()),
             });
         }
-        (self.trims.iter()).try_for_each(|t| t.check(&self.panels))?;
+        let has_panel = |name: &str| self.panels.iter().any(|p| p.name == name);
+        (self.trims.iter()).try_for_each(|t| t.check(has_panel))?;
         if self.panels.is_empty() {
             return Err(GarmentError::Field {
                 field: "panels".into(),

@@ -1,6 +1,6 @@
 //! Trims: small pieces and stitched lines set on a panel. They have a look and no mechanics.
 
-use super::{GarmentError, Panel};
+use super::GarmentError;
 use serde::{Deserialize, Serialize};
 
 /// Most trims of a garment.
@@ -79,12 +79,12 @@ pub struct PlacedTrim {
 
 impl Trim {
     /// Checks numbers and the panel's name.
-    pub(super) fn check(&self, panels: &[Panel]) -> Result<(), GarmentError> {
+    pub(super) fn check(&self, has_panel: impl Fn(&str) -> bool) -> Result<(), GarmentError> {
         let fault = |what: &str, why: &str| GarmentError::Field {
             field: format!("trims: {:?} on {}: {what}", self.kind, self.panel),
             why: why.into(),
         };
-        if !panels.iter().any(|p| p.name == self.panel) {
+        if !has_panel(&self.panel) {
             return Err(fault("panel", "is not in the pattern"));
         }
         let is_side = |s: &f64| *s > 0.0 && *s <= MAX_TRIM_SIDE;
@@ -105,5 +105,52 @@ impl Trim {
             size: self.size.map(|s| s as f32),
             turn: self.turn as f32,
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{GarmentMesh, Pattern, Size, Triangulation, library};
+
+    #[test]
+    fn library_trims_lie_on_their_panels() {
+        let mut count = 0;
+        for name in library::names() {
+            for size in Size::ALL {
+                let pattern = library::pattern(name, size).expect("a pattern");
+                let mesh = GarmentMesh::sew(&pattern, &Triangulation::default()).expect("sewn");
+                for trim in &mesh.render.trims {
+                    let away = |uv: &[f32; 2]| (uv[0] - trim.at[0]).hypot(uv[1] - trim.at[1]);
+                    let nearest = mesh
+                        .render
+                        .uv
+                        .iter()
+                        .map(away)
+                        .fold(f32::INFINITY, f32::min);
+                    assert!(nearest < 0.03, "{name} {size}: {trim:?} is {nearest} m off");
+                    count += 1;
+                }
+            }
+        }
+        assert!(count > 100, "{count}");
+    }
+
+    #[test]
+    fn faults_name_trim_and_panel_and_json_keeps_trims() {
+        let good = library::pattern("hoodie", Size::M).expect("a pattern");
+        let back = Pattern::from_json(&good.to_json()).expect("read");
+        assert_eq!((back.trims.len(), back.trims[0].kind), (3, TrimKind::Pouch));
+        let fault = |change: &dyn Fn(&mut Trim)| {
+            let mut bad = good.clone();
+            change(&mut bad.trims[0]);
+            bad.check().expect_err("a fault").to_string()
+        };
+        assert!(fault(&|t| t.panel = "moon".into()).contains("moon"));
+        assert!(fault(&|t| t.size[1] = f64::NAN).contains("size"));
+        assert!(fault(&|t| t.at[0] = f64::INFINITY).contains("place"));
+        let mut many = good.clone();
+        many.trims = vec![good.trims[0].clone(); MAX_TRIMS + 1];
+        assert!(many.check().is_err());
     }
 }

@@ -31,6 +31,9 @@ settings! {
         pub contact_depth: f32 = 0.10,
         /// Ambient light lost in a fold whose flanks rise at 45°.
         pub fold_shade: f32 = 1.2,
+        /// Share of the difference of a vertex's normal from those around it that is added to it: folds of a few edges, which
+        /// the mean of face normals flattens (docs/benchmarks/folds.md).
+        pub fold_gain: f32 = 1.0,
         /// Least and greatest openness.
         pub openness: [f32; 2] = [0.55, 1.1],
     }

@@ -90,7 +90,11 @@ pub(super) struct Layer {
 pub(super) struct ShadingScratch {
     /// Some visible face has this corner, shape `[vertices]`.
     pub(super) is_visible: Vec<bool>,
-    /// Faces with a visible corner.
+    /// Vertices whose normals are computed: visible ones and their neighbours, shape `[vertices]`.
+    pub(super) has_normal: Vec<bool>,
+    /// Sum of the neighbours' normals, shape `[vertices]`.
+    pub(super) around: Vec<V3>,
+    /// Faces with such a corner.
     pub(super) faces: Vec<u32>,
     /// Sum of area times compression, by its double angle in the pattern, and of area, shape `[vertices]`.
     pub(super) compression: Vec<[f32; 3]>,

@@ -39,7 +39,7 @@ impl Replacement<'_> {
         let (cloth, near) = (cloth?, self.field.at(pixel)?);
         let scene = self.picture.plate.at(&self.picture.captured, pixel);
         let scene = scene.map(|c| c.map(f32::from));
-        // Where the scene was never seen, the outline of close clothes is that of the body.
+        // Before a scene that was never seen the outline of close clothes is that of the body.
         let on_body = match scene {
             Some(_) => self.field.coverage(pixel),
             None => f32::from(u8::from(self.is_close(&near, pixel))),
