@@ -33,7 +33,7 @@ settings! {
         pub fold_shade: f32 = 1.2,
         /// Share of the difference of a vertex's normal from those around it that is added to it: folds of a few edges, which
         /// the mean of face normals flattens (docs/benchmarks/folds.md).
-        pub fold_gain: f32 = 1.0,
+        pub fold_gain: f32 = 1.5,
         /// Least and greatest openness.
         pub openness: [f32; 2] = [0.55, 1.1],
     }

@@ -53,7 +53,7 @@ test('of a choice the fields that are not sent are null', () => {
 });
 
 test('an optional zero is sent, an absent one is not', () => {
-  const choice = { garment: 'tshirt', size: '', color_rgb: 0 };
+  const choice = { garment: 'tshirt', size: '', color_rgb: 0, print: null };
   assert.equal(hex(encode(messages.GarmentChoice, choice)), '0a06747368697274' + '1800');
   assert.deepEqual(decode(messages.GarmentChoice, encode(messages.GarmentChoice, choice)), choice);
   assert.equal(decode(messages.GarmentChoice, bytes('')).color_rgb, null);

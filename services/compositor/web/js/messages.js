@@ -32,10 +32,16 @@ export const GarmentFit = schema('GarmentFit',
   [6, 'hem_mark', 'string'],
   [7, 'provisional', 'bool']);
 
+export const GarmentPrint = schema('GarmentPrint',
+  [1, 'kind', 'enum'],
+  [2, 'color_rgb', 'uint32'],
+  [3, 'period', 'float']);
+
 export const GarmentChoice = schema('GarmentChoice',
   [1, 'garment', 'string'],
   [2, 'size', 'string'],
-  [3, 'color_rgb', 'uint32?']);
+  [3, 'color_rgb', 'uint32?'],
+  [4, 'print', 'message', GarmentPrint]);
 
 export const GarmentInfo = schema('GarmentInfo',
   [1, 'name', 'string'],
