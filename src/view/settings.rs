@@ -77,6 +77,8 @@ settings! {
         pub reach: f32 = 0.1,
         /// Reach of own clothes off the tracked body within which they become skin where the scene was never seen, metres.
         pub close: f32 = 0.025,
+        /// Distance from the outline of the body to a garment up to which the limb between them is dressed, metres.
+        pub sliver: f32 = 0.03,
         /// Radius about the head in which hair may fall over clothes, metres.
         pub head: f32 = 0.2,
         /// Share of the clothes' colours below which hair falls over them; above it clothes have its colour.

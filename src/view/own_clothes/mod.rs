@@ -174,6 +174,7 @@ impl OwnClothes {
             skin: SkinLight::new(picture, worn, &self.field),
             is_own: &self.is_own,
             window: self.window,
+            cover,
         };
         let (mut out, mut report) = (Vec::new(), OwnClothesReport::default());
         let columns = picture.captured.image.width() as usize;

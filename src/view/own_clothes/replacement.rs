@@ -29,6 +29,8 @@ pub(super) struct Replacement<'a> {
     /// Own cloth by pixel, shape `[window]`.
     pub(super) is_own: &'a [bool],
     pub(super) window: Area,
+    /// Share of a pixel that a garment takes.
+    pub(super) cover: &'a dyn Fn([u32; 2]) -> f32,
 }
 
 impl Replacement<'_> {
@@ -44,7 +46,8 @@ impl Replacement<'_> {
             Some(_) => self.field.coverage(pixel),
             None => f32::from(u8::from(self.is_close(&near, pixel))),
         };
-        let skin = (on_body > 0.0).then(|| self.skin_at(&near, pixel, cloth));
+        let is_bare = on_body > 0.0 && !self.is_beside_garment(pixel, near.depth);
+        let skin = is_bare.then(|| self.skin_at(&near, pixel, cloth));
         let (new, is_skin) = match (skin.flatten(), scene) {
             (Some(skin), Some(scene)) => (mix(scene, skin, on_body), on_body >= 0.5),
             (Some(skin), None) => (skin, true),
@@ -65,6 +68,27 @@ impl Replacement<'_> {
             Change::Skin(color)
         } else {
             Change::Scene(color)
+        })
+    }
+
+    /// True between the outline of the body and a garment on it: the limb there is dressed, and own cloth that sticks out is no
+    /// bare skin.
+    fn is_beside_garment(&self, [u, v]: [u32; 2], depth: f32) -> bool {
+        let captured = &self.picture.captured;
+        let reach = self.picture.config.own_clothes.sliver * captured.viewport.camera.fx as f32;
+        let reach = (reach / depth).round().max(1.0) as i32;
+        let [width, height] = [captured.image.width(), captured.image.height()];
+        let at = |dx: i32, dy: i32| {
+            let (x, y) = (u.checked_add_signed(dx)?, v.checked_add_signed(dy)?);
+            (x < width && y < height).then_some([x, y])
+        };
+        let directions = [(1, 0), (0, 1)];
+        directions.into_iter().any(|(x, y)| {
+            [reach, -reach].into_iter().any(|r| {
+                let [out, inner] = [at(x * r, y * r), at(-x * r, -y * r)];
+                out.is_none_or(|p| self.field.coverage(p) < 0.5)
+                    && inner.is_some_and(|p| (self.cover)(p) > 0.5)
+            })
         })
     }
 
