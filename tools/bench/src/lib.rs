@@ -18,7 +18,7 @@
 //! - Outfits worn through motions: [`mod@worn`].
 //! - Folds finer than the simulation against the offline solver's: [`mod@folds`], their measure [`mod@folds::band`].
 //! - The composed picture: [`mod@picture`]; decisions read from it: [`mod@picture::signal`], truth: [`mod@picture::person_truth`],
-//!   measures: [`mod@picture::border`], [`mod@picture::noise`], [`mod@picture::edge_width`].
+//!   measures: `picture/border`, `picture/noise`, `picture/edge_width`.
 //! - Dressed scans with truth per point: [`mod@scans::scene`].
 //! - The embedded body: [`mod@made_body::figure`] (proportions), [`mod@made_body::field`] (surface),
 //!   [`mod@made_body::rig`], [`mod@made_body::directions`] (shape space), [`mod@made_body::statistics`] (published measurements).
