@@ -17,7 +17,7 @@
 //! - The dance: [`mod@dance`].
 //! - Outfits worn through motions: [`mod@worn`].
 //! - Folds finer than the simulation against the offline solver's: [`mod@folds`], their measure [`mod@folds::band`].
-//! - The composed picture: [`mod@picture`]; decisions read from it: [`mod@picture::signal`], truth: [`mod@picture::person_truth`],
+//! - The composed picture: [`mod@picture`]; decisions read from it: `picture/signal`, truth: `picture/person_truth`,
 //!   measures: `picture/border`, `picture/noise`, `picture/edge_width`.
 //! - Dressed scans with truth per point: [`mod@scans::scene`].
 //! - The embedded body: [`mod@made_body::figure`] (proportions), [`mod@made_body::field`] (surface),
