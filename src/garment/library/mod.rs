@@ -7,7 +7,7 @@ pub(crate) mod dress;
 pub(crate) mod skirt;
 pub(crate) mod top;
 pub(crate) mod trims;
-mod trousers;
+pub(crate) mod trousers;
 
 pub use catalogue::{dye, names, pattern, pattern_with};
 pub use cuts::{
