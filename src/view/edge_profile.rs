@@ -1,5 +1,6 @@
 //! Relief and tone across seams and finished edges, by distance; averaged over a pixel, so that nothing shimmers.
 
+use super::relief_curve::{bump, step};
 use tryon_garment::Finish;
 
 /// Distance between two entries, metres.
@@ -45,17 +46,6 @@ pub(crate) struct EdgeProfile {
     pub(crate) ribs: f32,
 }
 
-/// A smooth step from 0 to 1 at `at`.
-fn rise(x: f32, at: f32, width: f32) -> f32 {
-    let t = ((x - at) / width + 0.5).clamp(0.0, 1.0);
-    t * t * (3.0 - 2.0 * t)
-}
-
-/// A bump of height 1 at `at`.
-fn bump(x: f32, at: f32, width: f32) -> f32 {
-    (-0.5 * ((x - at) / width).powi(2)).exp()
-}
-
 impl EdgeProfile {
     /// Profile of a function from distance to relief and light taken.
     fn of(curve: impl Fn(f32) -> [f32; 2], pucker: [f32; 2], ribs: f32) -> Self {
@@ -78,11 +68,11 @@ impl EdgeProfile {
     /// Two panels sewn together: a groove between the layers of the allowance.
     pub(crate) fn seam(bulk: f32) -> Self {
         let curve = |d: f32| {
-            let groove = bump(d, 0.0, GROOVE[0]);
-            let below = 0.5 * (1.0 - rise(d, ALLOWANCE, 4.0 * SHOULDER));
+            let groove = bump(d, GROOVE[0]);
+            let below = 0.5 * (1.0 - step(d - ALLOWANCE, 4.0 * SHOULDER));
             [
                 bulk * (below - PULL[1] * groove),
-                TAKEN[1] * bump(d, 0.0, STITCH),
+                TAKEN[1] * bump(d, STITCH),
             ]
         };
         Self::of(curve, [0.0; 2], 0.0)
@@ -95,8 +85,8 @@ impl EdgeProfile {
             Finish::Raw => Self::of(|d| [CUT * bulk * fold(d), 0.0], [0.0; 2], 0.0),
             Finish::Hem { width, rows } => {
                 let curve = move |d: f32| {
-                    let layers = fold(d) * (1.0 - rise(d, width, SHOULDER));
-                    let row = |k: u8| bump(d, width - ROWS[0] - ROWS[1] * f32::from(k), STITCH);
+                    let layers = fold(d) * (1.0 - step(d - width, SHOULDER));
+                    let row = |k: u8| bump(d - (width - ROWS[0] - ROWS[1] * f32::from(k)), STITCH);
                     let stitches: f32 = (0..rows).map(row).sum();
                     [bulk * (layers - PULL[0] * stitches), TAKEN[0] * stitches]
                 };
@@ -104,25 +94,25 @@ impl EdgeProfile {
             }
             Finish::Rib { width } => {
                 let curve = move |d: f32| {
-                    let band = fold(d) * (1.0 - rise(d, width, SHOULDER));
-                    let groove = bump(d, width, GROOVE[1]);
-                    let stitches = bump(d, width + RIB_ROW, STITCH);
+                    let band = fold(d) * (1.0 - step(d - width, SHOULDER));
+                    let groove = bump(d - width, GROOVE[1]);
+                    let stitches = bump(d - (width + RIB_ROW), STITCH);
                     [
                         bulk * (RIBBED * band - PULL[1] * groove - RIB_PULL[0] * stitches),
-                        TAKEN[1] * bump(d, width, GROOVE_LINE) + RIB_PULL[1] * TAKEN[0] * stitches,
+                        TAKEN[1] * bump(d - width, GROOVE_LINE) + RIB_PULL[1] * TAKEN[0] * stitches,
                     ]
                 };
                 Self::of(curve, [PUCKERS[1], width + RIB_PUCKERS], width)
             }
             Finish::Band { width } => {
                 let curve = move |d: f32| {
-                    let band = fold(d) * (1.0 - rise(d, width, SHOULDER));
-                    let stitches = bump(d, ROWS[0], STITCH) + bump(d, width - ROWS[0], STITCH);
+                    let band = fold(d) * (1.0 - step(d - width, SHOULDER));
+                    let stitches = bump(d - ROWS[0], STITCH) + bump(d - (width - ROWS[0]), STITCH);
                     [
                         bulk * (STIFFENED * band
                             - PULL[0] * stitches
-                            - PULL[1] * bump(d, width, STITCH)),
-                        TAKEN[0] * stitches + TAKEN[1] * bump(d, width, STITCH),
+                            - PULL[1] * bump(d - width, STITCH)),
+                        TAKEN[0] * stitches + TAKEN[1] * bump(d - width, STITCH),
                     ]
                 };
                 Self::of(curve, [0.0; 2], 0.0)

@@ -97,6 +97,7 @@ mod off_person;
 mod outline_blur;
 mod own_clothes;
 mod print_layout;
+mod relief_curve;
 mod render;
 mod report;
 mod room_level;

@@ -1,5 +1,6 @@
 //! Relief and tone of trims in their own frames, from signed distances to their outlines.
 
+use super::relief_curve::{bump, step};
 use tryon_garment::TrimKind;
 
 /// Rows of stitches inside an edge: distance of the first, and of two from each other (metres).
@@ -41,17 +42,6 @@ const STRIP_LAYERS: f32 = 1.6;
 
 /// Height (metres) and share of light gained at a place.
 pub(super) type ReliefPoint = [f32; 2];
-
-/// Step from 0 to 1 about `x = 0`, `width` wide.
-fn step(x: f32, width: f32) -> f32 {
-    let t = (x / width + 0.5).clamp(0.0, 1.0);
-    t * t * (3.0 - 2.0 * t)
-}
-
-/// Bump of height 1 at 0.
-fn bump(x: f32, width: f32) -> f32 {
-    (-0.5 * (x / width).powi(2)).exp()
-}
 
 /// Signed distance from a rectangle, positive inside.
 fn in_rectangle([x, y]: [f32; 2], [w, h]: [f32; 2]) -> f32 {
@@ -172,9 +162,7 @@ fn pouch([w, h]: [f32; 2], bulk: f32, [x, y]: [f32; 2]) -> ReliefPoint {
     let slant = -((x.abs() - start[0]) * normal[0] + (y - start[1]) * normal[1]);
     let inside = in_rectangle([x, y], [w, h]).min(slant);
     let [height, tone] = piece(inside, 1.3 * bulk, 2);
-    let is_slant = step(h * POUCH_SLANT[1] + y - 0.5 * h + tall, FOLD)
-        * step(x.abs() - start[0], FOLD)
-        * step(in_rectangle([x, y], [w, h]), FOLD);
+    let is_slant = step(x.abs() - start[0], FOLD) * step(in_rectangle([x, y], [w, h]), FOLD);
     [height, tone + opening(slant + OPENING) * is_slant]
 }
 

@@ -5,6 +5,7 @@ use crate::captured_pixels::CapturedPixels;
 use crate::input::BodyView;
 use crate::settings::OwnClothesSettings;
 use crate::skin::{SkinClassifier, tone};
+use crate::srgb::linear;
 use tryon_body::parts::BodySegment;
 
 /// Part of the person that a piece of clothing covers.
@@ -45,7 +46,7 @@ struct Replaced {
     plain: Option<f32>,
 }
 
-/// Brightness by ITU-R BT.601, 0 to 255.
+/// Median brightness (0 to 255) of tones whose 90th percentile is less than `most` times the 10th; `None` of patterned cloth.
 fn median_of_plain(tones: &[[f32; 3]], most: f32) -> Option<f32> {
     let mut brightness: Vec<f32> = tones.iter().map(|t| t[0].max(1.0)).collect();
     brightness.sort_by(f32::total_cmp);
@@ -175,10 +176,9 @@ impl OwnWorn {
         const RANGE: [f32; 2] = [0.45, 1.35];
         let half = Half::of(segment);
         let own = self.replaced.iter().find(|r| Some(r.half) == half)?;
-        let linear_light = |c: f32| (c / 255.0).powf(2.2);
         let [y, ..] = tone(color.map(|c| c as u8));
         // Half of it, as a logarithm: the rest may be dye.
-        let shade = (linear_light(y) / linear_light(own.plain?)).sqrt();
+        let shade = (linear(y as u8) / linear(own.plain? as u8)).sqrt();
         Some(shade.clamp(RANGE[0], RANGE[1]))
     }
 
