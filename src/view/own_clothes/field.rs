@@ -38,8 +38,6 @@ pub(super) struct NearBody {
     pub(super) depth: f32,
     /// The cell itself is on the body.
     pub(super) is_on: bool,
-    /// Distance across the picture, metres.
-    pub(super) beside: f32,
 }
 
 impl BodyField {
@@ -116,6 +114,18 @@ impl BodyField {
         self.at_cell(i)
     }
 
+    /// Distance of a pixel's cell from the body across the picture, metres; infinite beyond the reach.
+    pub(super) fn beside(&self, [u, v]: [u32; 2]) -> f32 {
+        let cell = [u, v].map(|p| (p / self.stride) as usize);
+        let nearest = self.nearest.get(cell[1] * self.width + cell[0]);
+        let Some(nearest) = nearest.filter(|n| **n != NONE).map(|n| *n as usize) else {
+            return f32::INFINITY;
+        };
+        let on = [nearest % self.width, nearest / self.width];
+        let [x, y] = [0, 1].map(|k| cell[k].abs_diff(on[k]) as f32);
+        x.hypot(y) * self.drawn.depth[nearest] / self.focal
+    }
+
     /// Share of the body at a pixel, linear between the middles of cells.
     pub(super) fn coverage(&self, pixel: [u32; 2]) -> f32 {
         let stride = self.stride as f32;
@@ -139,14 +149,10 @@ impl BodyField {
     /// The body at or next to a cell.
     pub(super) fn at_cell(&self, i: usize) -> Option<NearBody> {
         let nearest = *self.nearest.get(i).filter(|n| **n != NONE)? as usize;
-        let depth = self.drawn.depth[nearest];
-        let across = [nearest, i].map(|k| ((k % self.width) as f32, (k / self.width) as f32));
-        let cells = (across[0].0 - across[1].0).hypot(across[0].1 - across[1].1);
         Some(NearBody {
             face: self.drawn.face[nearest],
-            depth,
+            depth: self.drawn.depth[nearest],
             is_on: nearest == i,
-            beside: cells * depth / self.focal,
         })
     }
 

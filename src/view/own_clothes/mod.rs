@@ -165,7 +165,7 @@ impl OwnClothes {
         &self,
         picture: &DressedPicture<'_>,
         worn: &OwnWorn,
-        cover: &impl Fn([u32; 2]) -> f32,
+        cover: &(impl Fn([u32; 2]) -> f32 + Sync),
     ) -> (ChangedPixels, OwnClothesReport) {
         let replacement = Replacement {
             picture,
@@ -176,14 +176,24 @@ impl OwnClothes {
             window: self.window,
             cover,
         };
+        let near = box_counts(
+            &self.is_own,
+            self.window.width as usize,
+            replacement.edge_width(),
+        );
+        let (par, width) = (picture.config.par, self.window.width as usize);
+        let mut changes = Vec::new();
+        par::map_into(par, near.len(), ROWS * width, &mut changes, |i| {
+            if near[i] > 0 { replacement.of(i) } else { None }
+        });
         let (mut out, mut report) = (Vec::new(), OwnClothesReport::default());
         let columns = picture.captured.image.width() as usize;
-        for (i, &is_own) in self.is_own.iter().enumerate() {
-            let Some(change) = replacement.of(i) else {
+        for (i, change) in changes.into_iter().enumerate() {
+            let Some(change) = change else {
                 continue;
             };
             let [u, v] = self.window.pixel(i);
-            let seen = usize::from(is_own && cover([u, v]) < 0.5);
+            let seen = usize::from(self.is_own[i] && cover([u, v]) < 0.5);
             let color = match change {
                 Change::None => {
                     report.left += seen;
@@ -205,25 +215,46 @@ impl OwnClothes {
 }
 
 /// Keeps pixels most of whose neighbours are marked, and fills holes between them.
-fn drop_lone(marks: &mut Vec<bool>, width: usize) {
-    const AROUND: isize = 2;
-    let rows = (marks.len() / width.max(1)) as isize;
-    let columns = width as isize;
-    // Sums along rows, then along columns.
-    let count = |from: &[u8], step: isize, k: isize, size: isize, at: isize| -> u8 {
-        (-AROUND..=AROUND)
-            .filter(|d| (0..size).contains(&(k + d)))
-            .map(|d| from[(at + d * step) as usize])
-            .sum()
-    };
-    let ones: Vec<u8> = marks.iter().map(|m| u8::from(*m)).collect();
-    let across: Vec<u8> = (0..ones.len() as isize)
-        .map(|i| count(&ones, 1, i % columns, columns, i))
-        .collect();
-    let most = (2 * AROUND + 1).pow(2) as u8 / 2;
-    *marks = (0..ones.len() as isize)
-        .map(|i| count(&across, columns, i / columns, rows, i) > most)
-        .collect();
+fn drop_lone(marks: &mut [bool], width: usize) {
+    const AROUND: usize = 2;
+    const MOST: u8 = ((2 * AROUND + 1) * (2 * AROUND + 1) / 2) as u8;
+    let counts = box_counts(marks, width, AROUND);
+    for (mark, count) in marks.iter_mut().zip(counts) {
+        *mark = count > MOST;
+    }
+}
+
+/// Marked pixels in the square of `reach` pixels around each, up to 255.
+fn box_counts(marks: &[bool], width: usize, reach: usize) -> Vec<u8> {
+    let rows = marks.len() / width.max(1);
+    let mut across = vec![0u16; marks.len()];
+    for (row, out) in marks
+        .chunks(width.max(1))
+        .zip(across.chunks_mut(width.max(1)))
+    {
+        let mut sum = row.iter().take(reach).filter(|m| **m).count() as u16;
+        for x in 0..width {
+            sum += u16::from(row.get(x + reach).is_some_and(|m| *m));
+            out[x] = sum;
+            sum -= u16::from(x >= reach && row[x - reach]);
+        }
+    }
+    let mut sums = vec![0u16; width];
+    let mut out = Vec::with_capacity(marks.len());
+    let row = |y: usize| &across[y * width..][..width];
+    (0..reach.min(rows)).for_each(|y| sums.iter_mut().zip(row(y)).for_each(|(s, a)| *s += a));
+    for y in 0..rows {
+        if y + reach < rows {
+            let entering = row(y + reach);
+            sums.iter_mut().zip(entering).for_each(|(s, a)| *s += a);
+        }
+        out.extend(sums.iter().map(|s| (*s).min(255) as u8));
+        if y >= reach {
+            let leaving = row(y - reach);
+            sums.iter_mut().zip(leaving).for_each(|(s, a)| *s -= a);
+        }
+    }
+    out
 }
 
 /// Part of the picture around the head, where hair may have the colour of clothes.
@@ -258,5 +289,33 @@ impl HeadCircle {
     fn has(&self, u: u32, v: u32) -> bool {
         let [x, y] = [u as f32 - self.centre[0], v as f32 - self.centre[1]];
         x * x + y * y < self.radius * self.radius
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn counts_are_those_of_every_square() {
+        for (width, rows, reach) in [(7, 5, 2), (3, 4, 3), (1, 6, 2), (9, 1, 1), (0, 0, 2)] {
+            let marks: Vec<bool> = (0..width * rows).map(|i| i * 7 % 5 < 2).collect();
+            let count = |i: usize| {
+                let (x, y) = (i % width, i / width);
+                let is_near = |k: &usize| {
+                    (k % width).abs_diff(x) <= reach && (k / width).abs_diff(y) <= reach
+                };
+                (0..marks.len())
+                    .filter(is_near)
+                    .filter(|k| marks[*k])
+                    .count() as u8
+            };
+            let expected: Vec<u8> = (0..marks.len()).map(count).collect();
+            assert_eq!(
+                box_counts(&marks, width, reach),
+                expected,
+                "{width} {rows} {reach}"
+            );
+        }
     }
 }

@@ -30,7 +30,7 @@ pub(super) struct Replacement<'a> {
     pub(super) is_own: &'a [bool],
     pub(super) window: Area,
     /// Share of a pixel that a garment takes.
-    pub(super) cover: &'a dyn Fn([u32; 2]) -> f32,
+    pub(super) cover: &'a (dyn Fn([u32; 2]) -> f32 + Sync),
 }
 
 impl Replacement<'_> {
@@ -109,13 +109,14 @@ impl Replacement<'_> {
             let metres = captured.metres(u, v);
             metres > 0.0 && (metres - near.depth).abs() < settings.off_body
         };
-        near.is_on || near.beside <= settings.close && around.into_iter().any(is_person)
+        near.is_on
+            || self.field.beside([u, v]) <= settings.close && around.into_iter().any(is_person)
     }
 
     /// Colours on both sides of an antialiased edge at pixel `i` of the window.
     fn around(&self, i: usize) -> Around {
         let image = self.picture.captured.image;
-        let [width, reach] = [self.window.width as isize, self.edge_width()];
+        let [width, reach] = [self.window.width as isize, self.edge_width() as isize];
         let at = [i as isize % width, i as isize / width];
         let index = |x: isize, y: isize| {
             let is_inside =
@@ -149,10 +150,10 @@ impl Replacement<'_> {
     }
 
     /// Reach of an edge, pixels of the picture: it is antialiased, and readings of depth end up to a pixel of theirs beside it.
-    fn edge_width(&self) -> isize {
+    pub(super) fn edge_width(&self) -> usize {
         let viewport = self.picture.captured.viewport;
         let reading = f64::from(viewport.camera.height) / f64::from(viewport.depth[1]);
-        (2.0 * viewport.scale.max(reading)).ceil().max(1.0) as isize
+        (2.0 * viewport.scale.max(reading)).ceil().max(1.0) as usize
     }
 
     /// Colour of skin in the place of cloth of this colour.
